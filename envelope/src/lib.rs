@@ -5,6 +5,7 @@
 pub mod address;
 pub mod call;
 pub mod change;
+pub mod codec;
 pub mod id;
 pub mod key;
 pub mod message;

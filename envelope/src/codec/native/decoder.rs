@@ -1,0 +1,227 @@
+//! From key, header and content to an envelope, with what is known of the stream kept.
+
+use super::reader::Reader;
+use super::{HeaderError, VERSION};
+use crate::call::Call;
+use crate::change::{Change, Instance};
+use crate::id::{BootId, EntityId};
+use crate::key::escape::Spelling;
+use crate::key::{Keys, ParsedKey, Space, address_from_chunks, instance_chunk};
+use crate::message::{Attributes, Envelope, Label, Message};
+use crate::name::{ContentType, Descriptor, Group, Name};
+use crate::stamp::{Priority, Stamp, VIA_MAX};
+use crate::time::Wall;
+use bytes::Bytes;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// How many keys and labels a decoder remembers. A fleet of 100 vehicles with 40 streams each stays below; beyond it
+/// the memory is forgotten whole, which costs time but nothing else.
+const REMEMBERED_MAX: usize = 8_192;
+
+/// Reads envelopes. It remembers keys and labels, so that the messages of one stream share their label.
+#[derive(Debug)]
+pub struct Decoder {
+    keys: Keys,
+    known: BTreeMap<Arc<str>, Arc<Known>>,
+    labels: BTreeSet<Arc<Label>>,
+    last: Option<(Arc<str>, Arc<Known>)>,
+}
+
+/// What the constant part of a header said on a key.
+#[derive(Debug)]
+struct Known {
+    constant: Box<[u8]>,
+    label: Arc<Label>,
+    node: EntityId,
+    boot: BootId,
+    priority: Priority,
+    space: Space,
+    instance: Option<Arc<Instance>>,
+}
+
+impl Decoder {
+    /// A decoder of one fleet's keys.
+    pub fn new(keys: Keys) -> Self {
+        Self { keys, known: BTreeMap::new(), labels: BTreeSet::new(), last: None }
+    }
+
+    /// Reads an envelope from a sample; `deleted` says that the sample is a Zenoh DELETE.
+    ///
+    /// # Errors
+    /// [`HeaderError`] when key or header cannot be read or do not agree.
+    pub fn decode(
+        &mut self,
+        key: &str,
+        deleted: bool,
+        header: &[u8],
+        content: Bytes,
+    ) -> Result<Envelope, HeaderError> {
+        let known = self.known(key, header)?;
+        let mut rest = Reader::new(&header[known.constant.len()..]);
+        let stamp = read_stamp(&known, &mut rest)?;
+        let (change, instance, call) = read_change(&known, &mut rest, deleted)?;
+        match rest.left() {
+            0 => {
+                let label = known.label.clone();
+                Ok(Envelope { message: Message { label, change, instance, call, content }, stamp })
+            }
+            left => Err(HeaderError::Trailing(left)),
+        }
+    }
+
+    fn known(&mut self, key: &str, header: &[u8]) -> Result<Arc<Known>, HeaderError> {
+        if let Some((last, known)) = &self.last
+            && **last == *key
+            && header.starts_with(&known.constant)
+        {
+            return Ok(known.clone());
+        }
+        let remembered =
+            self.known.get_key_value(key).filter(|(_, known)| header.starts_with(&known.constant));
+        let (key, known) = match remembered {
+            Some((key, known)) => (key.clone(), known.clone()),
+            None => self.learn(key, header)?,
+        };
+        self.last = Some((key, known.clone()));
+        Ok(known)
+    }
+
+    fn learn(&mut self, key: &str, header: &[u8]) -> Result<(Arc<str>, Arc<Known>), HeaderError> {
+        let parsed = self.keys.parse(key)?;
+        if parsed.space == Space::Alive {
+            return Err(HeaderError::Disagrees("an envelope on a liveliness key".into()));
+        }
+        let mut known = read_constant(&parsed, header)?;
+        if self.known.len() >= REMEMBERED_MAX || self.labels.len() >= REMEMBERED_MAX {
+            self.known.clear();
+            self.labels.clear();
+        }
+        known.label = match self.labels.get(&known.label) {
+            Some(label) => label.clone(),
+            None => {
+                self.labels.insert(known.label.clone());
+                known.label
+            }
+        };
+        let (key, known): (Arc<str>, _) = (key.into(), Arc::new(known));
+        self.known.insert(key.clone(), known.clone());
+        Ok((key, known))
+    }
+}
+
+fn invalid<E: ToString>(field: &'static str) -> impl Fn(E) -> HeaderError {
+    move |why| HeaderError::Invalid { field, why: why.to_string() }
+}
+
+fn read_constant(key: &ParsedKey<'_>, header: &[u8]) -> Result<Known, HeaderError> {
+    let mut rest = Reader::new(header);
+    match rest.byte("version").map_err(|_| HeaderError::Missing)? {
+        VERSION => {}
+        other => return Err(HeaderError::Version(other)),
+    }
+    let spelled = match rest.byte("spelling")? {
+        0 => Spelling::Dots,
+        1 => Spelling::Colons,
+        2 => Spelling::Exact(rest.text("spelling")?.to_owned()),
+        other => return Err(invalid("spelling")(format!("{other} is outside 0 to 2"))),
+    };
+    let address = address_from_chunks(key.address, &spelled).map_err(HeaderError::Disagrees)?;
+    let content_type = match rest.byte("content type")? {
+        0 => ContentType::Lmcp,
+        1 => ContentType::Umaa,
+        2 => ContentType::Cdr,
+        3 => ContentType::Aldis,
+        4 => ContentType::Other(Name::new(rest.text("content type")?).map_err(invalid("content type"))?),
+        other => return Err(invalid("content type")(format!("{other} is outside 0 to 4"))),
+    };
+    let descriptor = if rest.present("descriptor")? {
+        Descriptor::new(rest.text("descriptor")?).map_err(invalid("descriptor"))?
+    } else {
+        match &address {
+            crate::Address::Name(name) => name.clone().into(),
+            _ => return Err(invalid("descriptor")("missing, and the address is no name")),
+        }
+    };
+    let source_group = Group::new(rest.text("source group")?).map_err(invalid("source group"))?;
+    let node = EntityId::new(rest.varint("node")?).map_err(invalid("node"))?;
+    let boot = BootId(rest.varint("boot id")?);
+    let priority = Priority::try_from(rest.byte("priority")?).map_err(invalid("priority"))?;
+    let constant = header[..header.len() - rest.left()].into();
+    let attributes = Attributes { content_type, descriptor, source_group, source: key.source };
+    let label = Arc::new(Label { address, attributes });
+    let instance = key.instance.map(|hash| Arc::new(Instance { hash, key: None }));
+    Ok(Known { constant, label, node, boot, priority, space: key.space, instance })
+}
+
+fn read_stamp(known: &Known, rest: &mut Reader<'_>) -> Result<Stamp, HeaderError> {
+    let sequence = rest.varint("sequence")?;
+    if sequence == 0 {
+        return Err(invalid("sequence")("0, but streams count from 1"));
+    }
+    let source_time = Wall(rest.zigzag("source time")?);
+    let lifespan_left_ms = match rest.present("lifespan")? {
+        true => Some(rest.varint_u32("lifespan")?),
+        false => None,
+    };
+    let skipped = rest.varint_u32("skipped")?;
+    let passed = rest.varint("via")?;
+    if passed > VIA_MAX as u64 {
+        return Err(invalid("via")(format!("{passed} nodes passed, at most {VIA_MAX} are allowed")));
+    }
+    let via = (0..passed)
+        .map(|_| EntityId::new(rest.varint("via")?).map_err(invalid("via")))
+        .collect::<Result<_, _>>()?;
+    let Known { node, boot, priority, .. } = *known;
+    Ok(Stamp { node, boot, sequence, source_time, lifespan_left_ms, priority, skipped, via })
+}
+
+type Changed = (Change, Option<Arc<Instance>>, Option<Box<Call>>);
+
+fn read_change(known: &Known, rest: &mut Reader<'_>, deleted: bool) -> Result<Changed, HeaderError> {
+    let change = match rest.byte("change")? {
+        0 => Change::Put,
+        1 => Change::Dispose,
+        2 => Change::Unregister,
+        other => return Err(invalid("change")(format!("{other} is outside 0 to 2"))),
+    };
+    let agrees = deleted == (change == Change::Dispose)
+        && (known.space == Space::Writer) == (change == Change::Unregister);
+    if !agrees {
+        let how = if deleted { "a delete" } else { "a put" };
+        return Err(HeaderError::Disagrees(format!("{change:?} came as {how} in {:?}", known.space)));
+    }
+    let instance = match rest.present("key")? {
+        true => Some(instance_of_key(known, rest.bytes("key")?)?),
+        false => known.instance.clone(),
+    };
+    if change != Change::Put && instance.is_none() {
+        return Err(HeaderError::Disagrees(format!("{change:?} without an instance")));
+    }
+    let call = match rest.present("call")? {
+        true => Some(Box::new(rest.value("call")?)),
+        false => None,
+    };
+    Ok((change, instance, call))
+}
+
+/// The instance of a serialized key, which must be the one that the Zenoh key names.
+fn instance_of_key(known: &Known, key: &[u8]) -> Result<Arc<Instance>, HeaderError> {
+    let disagrees = || HeaderError::Disagrees("the instance is not that of the serialized key".into());
+    let named = known.instance.as_ref().ok_or_else(disagrees)?.hash;
+    let bytes = Bytes::copy_from_slice(key);
+    let instance = if known.label.is_broadcast() {
+        if !Instance::hash_fits(named, key) {
+            return Err(disagrees());
+        }
+        Instance { hash: named, key: Some(bytes) }
+    } else {
+        let width = if key.len() <= 16 { crate::KeyWidth::Fits16 } else { crate::KeyWidth::Wider };
+        let instance = Instance::of_key(bytes, width);
+        if instance_chunk(&known.label, &instance) != named {
+            return Err(disagrees());
+        }
+        instance
+    };
+    Ok(Arc::new(instance))
+}

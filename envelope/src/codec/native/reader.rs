@@ -1,0 +1,80 @@
+//! Reading postcard's primitives from a slice, never past its end.
+
+use super::HeaderError;
+
+/// A place in a header.
+pub(super) struct Reader<'a> {
+    rest: &'a [u8],
+}
+
+impl<'a> Reader<'a> {
+    pub(super) fn new(bytes: &'a [u8]) -> Self {
+        Self { rest: bytes }
+    }
+
+    pub(super) fn left(&self) -> usize {
+        self.rest.len()
+    }
+
+    pub(super) fn byte(&mut self, field: &'static str) -> Result<u8, HeaderError> {
+        let (&byte, rest) = self.rest.split_first().ok_or(HeaderError::Truncated(field))?;
+        self.rest = rest;
+        Ok(byte)
+    }
+
+    /// A flag before an optional field.
+    pub(super) fn present(&mut self, field: &'static str) -> Result<bool, HeaderError> {
+        match self.byte(field)? {
+            0 => Ok(false),
+            1 => Ok(true),
+            other => Err(HeaderError::Invalid { field, why: format!("{other} is neither 0 nor 1") }),
+        }
+    }
+
+    pub(super) fn varint(&mut self, field: &'static str) -> Result<u64, HeaderError> {
+        let mut number = 0u64;
+        for shift in (0..64).step_by(7) {
+            let byte = self.byte(field)?;
+            let bits = u64::from(byte & 0x7f);
+            if shift == 63 && bits > 1 {
+                break;
+            }
+            number |= bits << shift;
+            if byte < 0x80 {
+                return Ok(number);
+            }
+        }
+        Err(HeaderError::Invalid { field, why: "a number over 64 bits".into() })
+    }
+
+    pub(super) fn varint_u32(&mut self, field: &'static str) -> Result<u32, HeaderError> {
+        let number = self.varint(field)?;
+        u32::try_from(number)
+            .map_err(|_| HeaderError::Invalid { field, why: format!("{number} is over 32 bits") })
+    }
+
+    pub(super) fn zigzag(&mut self, field: &'static str) -> Result<i64, HeaderError> {
+        let number = self.varint(field)?;
+        Ok((number >> 1) as i64 ^ -((number & 1) as i64))
+    }
+
+    pub(super) fn bytes(&mut self, field: &'static str) -> Result<&'a [u8], HeaderError> {
+        let length = usize::try_from(self.varint(field)?).map_err(|_| HeaderError::Truncated(field))?;
+        let (bytes, rest) = self.rest.split_at_checked(length).ok_or(HeaderError::Truncated(field))?;
+        self.rest = rest;
+        Ok(bytes)
+    }
+
+    pub(super) fn text(&mut self, field: &'static str) -> Result<&'a str, HeaderError> {
+        std::str::from_utf8(self.bytes(field)?)
+            .map_err(|_| HeaderError::Invalid { field, why: "not UTF-8".into() })
+    }
+
+    /// A value that serde reads.
+    pub(super) fn value<T: serde::Deserialize<'a>>(&mut self, field: &'static str) -> Result<T, HeaderError> {
+        let (value, rest) = postcard::take_from_bytes(self.rest)
+            .map_err(|why| HeaderError::Invalid { field, why: why.to_string() })?;
+        self.rest = rest;
+        Ok(value)
+    }
+}
