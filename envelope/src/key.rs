@@ -155,6 +155,24 @@ impl Keys {
         key
     }
 
+    /// The key expressions that receive all that some prefixes receive, none inside another: a session gets a sample
+    /// once for each of its subscribers that match.
+    pub fn cover(&self, space: Space, prefixes: &[Prefix]) -> Vec<String> {
+        let mut expressions: Vec<_> = prefixes.iter().map(|p| self.subscription(space, p)).collect();
+        expressions.sort();
+        expressions.dedup();
+        // What an expression meets is every key that begins with its certain part; an id's ends at a chunk's end.
+        let certain =
+            |e: &str| e.trim_end_matches("/**").trim_end_matches("$*").trim_end_matches("**").to_owned();
+        let inside = |inner: &String, outer: &String| {
+            let is_text = outer.ends_with("$*/**") || outer.ends_with("*/*/**");
+            let (i, o) = (certain(inner), certain(outer));
+            inner != outer && i.strip_prefix(&o).is_some_and(|rest| is_text || rest.starts_with('/'))
+        };
+        let kept = |e: &&String| !expressions.iter().any(|outer| inside(e, outer));
+        expressions.iter().filter(kept).cloned().collect()
+    }
+
     /// All that an entity puts in a space: what access control allows it.
     pub fn of_entity(&self, space: &str, entity: EntityId) -> String {
         match space {

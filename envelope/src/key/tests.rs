@@ -55,6 +55,21 @@ fn subscriptions_are_one_key_expression() {
 }
 
 #[test]
+fn a_cover_holds_no_expression_inside_another() {
+    let cover = |prefixes: &[&str]| {
+        let prefixes: Vec<_> = prefixes.iter().map(|p| Prefix::new(p).unwrap()).collect();
+        let root = "aldis/blue/*/*/*/";
+        keys().cover(Space::Data, &prefixes).iter().map(|e| e[root.len()..].to_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!(cover(&["afrl.cmasi.Air", "afrl.cm", "afrl.cmasi", "UMAA::"]), ["UMAA$*/**", "afrl/cm$*/**"]);
+    assert_eq!(cover(&["eid20", "eid200", "eid20.sid1", "eid20.sidall"]), ["eid20/**", "eid200/**"]);
+    assert_eq!(cover(&["eid20.sid1", "eid20.sid11"]), ["eid20/sid1", "eid20/sid11"]);
+    assert_eq!(cover(&["e", "eid20"]), ["e$*/**"]);
+    assert_eq!(cover(&["a.", "a:", "a"]), ["a$*/**"]);
+    assert_eq!(cover(&["", "a", "eid1"]), ["**"]);
+}
+
+#[test]
 fn two_topics_to_one_service_do_not_share_an_instance() {
     let instance = Instance::of_number(7);
     let label = |descriptor: &str| {

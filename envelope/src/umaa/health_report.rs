@@ -1,0 +1,114 @@
+//! `UMAA::SO::HealthReport::HealthReport` (ICD 5.1.1, table 9).
+
+use super::{LongDescription, Topic};
+use crate::change::KeyWidth;
+use crate::guid::Guid;
+use crate::time::DateTime;
+use bytes::Bytes;
+use serde::{Deserialize, Serialize};
+
+/// The kind of system that an error concerns (`ErrorCodeEnumType`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "the field's names say it all")]
+pub enum ErrorCode {
+    Actuator,
+    Filesys,
+    None,
+    Power,
+    Processor,
+    Ram,
+    Rom,
+    Sensor,
+    Software,
+}
+
+/// How bad it is (`ErrorConditionEnumType`). The order is the wire's, not that of badness.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum ErrorCondition {
+    /// It works, with errors.
+    Error,
+    /// It does not work.
+    Fail,
+    /// Something worth knowing.
+    Info,
+    /// All is well.
+    None,
+    /// It works, but look at it.
+    Warn,
+}
+
+/// The most recent health of one resource.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct HealthReport {
+    /// The kind of system.
+    pub code: ErrorCode,
+    /// When the error occurred.
+    pub log_time: DateTime,
+    /// How bad it is.
+    pub severity: ErrorCondition,
+    /// In words, for people.
+    pub status: LongDescription,
+    /// When the report was made.
+    pub time_stamp: DateTime,
+    /// Who reports (key).
+    pub source: Guid,
+    /// Whose health it is (key).
+    pub resource_id: Guid,
+}
+
+impl Topic for HealthReport {
+    const NAME: &'static str = "UMAA::SO::HealthReport::HealthReport";
+    /// Two GUIDs, 32 bytes.
+    const KEY_WIDTH: KeyWidth = KeyWidth::Wider;
+
+    fn key(&self) -> Bytes {
+        [self.source.0, self.resource_id.0].concat().into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::umaa::{ContentError, decode, encode, label};
+    use crate::{EntityId, ServiceId, Source};
+
+    fn report() -> HealthReport {
+        HealthReport {
+            code: ErrorCode::Software,
+            log_time: DateTime::new(1, 2).unwrap(),
+            severity: ErrorCondition::Warn,
+            status: LongDescription::new("ok").unwrap(),
+            time_stamp: DateTime::new(3, 4).unwrap(),
+            source: Guid([1; 16]),
+            resource_id: Guid([2; 16]),
+        }
+    }
+
+    #[test]
+    fn the_content_is_the_members_in_the_order_of_the_wire() {
+        let content = encode(&report());
+        assert_eq!(content[..9], [8, 2, 4, 4, 2, b'o', b'k', 6, 8]);
+        assert_eq!(content[9..], [[1; 16], [2; 16]].concat());
+        assert_eq!(decode::<HealthReport>(&content), Ok(report()));
+        assert!(label::<HealthReport>(Source::new(EntityId::new(1).unwrap(), ServiceId::HEALTH)).is_ok());
+    }
+
+    #[test]
+    fn the_key_hash_is_the_digest_of_source_and_resource() {
+        let instance = report().instance();
+        assert_eq!(instance.hash, crate::KeyHash::md5(&[&[1; 16], &[2; 16]]));
+    }
+
+    #[test]
+    fn what_is_not_exactly_a_report_is_refused() {
+        let content = encode(&report());
+        for cut in 0..content.len() {
+            assert!(decode::<HealthReport>(&content[..cut]).is_err());
+        }
+        let longer = [&content[..], &[0]].concat();
+        assert!(matches!(decode::<HealthReport>(&longer), Err(ContentError::Trailing { left: 1, .. })));
+        let mut late = content.to_vec();
+        late[0] = 9;
+        assert!(matches!(decode::<HealthReport>(&late), Err(ContentError::Unreadable { .. })));
+    }
+}
