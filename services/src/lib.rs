@@ -1,1 +1,26 @@
-//! Services.
+//! The node of Aldis and its services.
+//!
+//! Pure: no input or output, no clock, no randomness. Time, seeds and bytes come in as arguments; [`Node::handle`] turns
+//! events into effects, and a shell (the gateway) or the simulator carries them out.
+
+pub mod allow;
+pub mod bridge;
+pub mod calls;
+pub mod counters;
+pub mod event;
+pub mod health;
+mod host;
+mod labels;
+pub mod log;
+pub mod map;
+pub mod node;
+pub mod notes;
+pub mod registry;
+pub mod service;
+pub mod sim;
+pub mod streams;
+
+pub use bridge::BridgeSpec;
+pub use event::{BridgeEvent, BridgeId, Effect, Event, PeerEvent, PeerId, PublisherId};
+pub use node::{Node, NodeConfig};
+pub use service::{Input, Outbox, Service, ServiceSpec};

@@ -1,0 +1,109 @@
+//! All that a node can be told, and all that it can ask for. A shell knows nothing else of it.
+
+use crate::service::{ComponentHealth, Job, JobOutput, Note};
+use aldis_envelope::codec::native::HeaderError;
+use aldis_envelope::codec::stream::StreamError;
+use aldis_envelope::{Envelope, Label, Monotonic, Priority, Source};
+use bytes::Bytes;
+use std::sync::Arc;
+
+/// A bridge of a node, by its place in the configuration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct BridgeId(pub usize);
+
+/// A peer of a bridge, numbered by the shell, never twice in a node's life.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct PeerId(pub u64);
+
+/// A key that the node puts envelopes on, numbered by the node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct PublisherId(pub usize);
+
+/// Something that happened.
+pub enum Event {
+    /// The session on the bus is up.
+    BusOpened,
+    /// The session on the bus is down, and why.
+    BusClosed(String),
+    /// An envelope from the bus.
+    Sample(Envelope),
+    /// A sample from the bus that is no envelope.
+    SampleRefused(HeaderError),
+    /// So many samples from the bus were dropped because the node did not keep up.
+    SamplesShed(u64),
+    /// A service's token appeared (true) or vanished. A hint, and idempotent.
+    Alive(Source, bool),
+    /// All tokens that were there when the session opened have been told.
+    AliveKnown,
+    /// Something at a bridge.
+    Bridge(BridgeId, BridgeEvent),
+    /// Something at a peer of a bridge.
+    Peer(BridgeId, PeerId, PeerEvent),
+    /// A job is done, or panicked with this text.
+    Job(Source, u64, Result<JobOutput, String>),
+    /// The health of something that the shell looks after changed.
+    Component(ComponentHealth),
+    /// The moment of the last [`Effect::Arm`] has come.
+    Deadline,
+    /// The node must end.
+    Shutdown,
+}
+
+/// Something at a bridge.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum BridgeEvent {
+    /// It listens or looks for its peer, in words.
+    Working(String),
+    /// It cannot, and why; the shell tries again.
+    Failing(String),
+}
+
+/// Something at a peer of a bridge.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum PeerEvent {
+    /// The peer is there under this name, and so many bytes may be sent to it.
+    Up(String, usize),
+    /// The peer is gone, and why.
+    Down(String),
+    /// A message in delimited form.
+    Message(Bytes),
+    /// So many bytes more may be sent.
+    Ready(usize),
+    /// Something that is no message.
+    Bad(StreamError),
+}
+
+/// Something to do.
+pub enum Effect {
+    /// Have these key expressions subscribed to, and no others.
+    Subscribe(Vec<String>),
+    /// Prepare a publisher. What is put with it has this constant part of the header.
+    Declare {
+        /// Its number.
+        publisher: PublisherId,
+        /// Its key.
+        key: String,
+        /// The first part of every header.
+        constant: Vec<u8>,
+        /// Fixed for the stream.
+        priority: Priority,
+    },
+    /// Put an envelope with a prepared publisher; a dispose as a DELETE.
+    Publish(PublisherId, Envelope),
+    /// Put an envelope on a key that is used too rarely for a publisher.
+    PublishOn(String, Envelope),
+    /// Show (true) or withdraw the token of a service.
+    Token(Source, bool),
+    /// Write a message to a peer.
+    Send(BridgeId, PeerId, Arc<Label>, Bytes),
+    /// Stop (true) or go on reading from peers and bus.
+    PauseInput(bool),
+    /// Compute something outside the loop and tell with [`Event::Job`].
+    Job(Source, u64, Job),
+    /// Tell people.
+    Say(Note),
+    /// Send [`Event::Deadline`] at this moment; replaces the last one.
+    Arm(Monotonic),
+    /// The node has ended; nothing follows.
+    Exit,
+}

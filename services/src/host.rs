@@ -1,0 +1,169 @@
+//! Runs services: gives them inputs, takes what they want done, keeps the crash of one from the others.
+
+use crate::service::{Action, Input, Level, Outbox, Service, ServiceSpec};
+use aldis_envelope::{Address, Monotonic, Now, Prefix};
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Duration;
+
+/// A service that crashes sooner after its start than this waits before it starts again, twice as long each time.
+const MIN_RUN_TIME: Duration = Duration::from_secs(10);
+/// The first wait before a restart. At zero a service that crashes at its start would hold the node.
+const RESTART_DELAY_MIN: Duration = Duration::from_secs(1);
+/// The longest wait before a restart.
+const RESTART_DELAY_MAX: Duration = Duration::from_secs(60);
+
+/// What a service did with an input.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Ran {
+    /// It took it, or does not run.
+    Well,
+    /// It panicked with this text and was retired; it starts again by itself.
+    Crashed(String),
+}
+
+/// One service with what the host knows of it.
+pub(crate) struct Hosted {
+    pub(crate) spec: ServiceSpec,
+    service: Option<Box<dyn Service>>,
+    outbox: Outbox,
+    prefixes: Vec<Prefix>,
+    deadline: Option<Monotonic>,
+    started_at: Monotonic,
+    restart_at: Option<Monotonic>,
+    restart_delay: Duration,
+    retired: bool,
+}
+
+impl Hosted {
+    pub(crate) fn new(spec: ServiceSpec) -> Self {
+        let outbox = Outbox::new(spec.source);
+        Self {
+            spec,
+            service: None,
+            outbox,
+            prefixes: Vec::new(),
+            deadline: None,
+            started_at: Monotonic::START,
+            restart_at: None,
+            restart_delay: RESTART_DELAY_MIN,
+            retired: false,
+        }
+    }
+
+    /// Makes the service and tells it that it has started.
+    pub(crate) fn start(&mut self, now: Now) -> Ran {
+        self.restart_at = None;
+        self.started_at = now.monotonic;
+        let factory = self.spec.factory.clone();
+        match catch_unwind(AssertUnwindSafe(|| {
+            let service = factory();
+            let prefixes = service.subscriptions();
+            (service, prefixes)
+        })) {
+            Ok((service, prefixes)) => {
+                self.service = Some(service);
+                self.prefixes = prefixes;
+                self.run(now, Input::Started)
+            }
+            Err(panic) => self.crash(now, &*panic),
+        }
+    }
+
+    /// Gives the service an input.
+    pub(crate) fn run(&mut self, now: Now, input: Input<'_>) -> Ran {
+        let Some(service) = self.service.as_mut() else { return Ran::Well };
+        let outbox = &mut self.outbox;
+        let run = catch_unwind(AssertUnwindSafe(|| {
+            service.handle(now, input, outbox);
+            service.next_deadline()
+        }));
+        match run {
+            Ok(deadline) => {
+                self.deadline = deadline;
+                Ran::Well
+            }
+            Err(panic) => self.crash(now, &*panic),
+        }
+    }
+
+    /// What the service wants done since the last time.
+    pub(crate) fn actions(&mut self) -> std::vec::Drain<'_, Action> {
+        self.outbox.drain()
+    }
+
+    /// Ends the service for good.
+    pub(crate) fn retire(&mut self) {
+        self.service = None;
+        self.deadline = None;
+        self.restart_at = None;
+        self.retired = true;
+    }
+
+    pub(crate) fn is_running(&self) -> bool {
+        self.service.is_some()
+    }
+
+    pub(crate) fn state(&self) -> &'static str {
+        match (self.is_running(), self.retired) {
+            (true, _) => "running",
+            (false, true) => "retired",
+            (false, false) => "crashed, starts again",
+        }
+    }
+
+    /// Every prefix that it receives: its own, its entity's and what it subscribed to.
+    pub(crate) fn prefixes(&self) -> impl Iterator<Item = Prefix> + '_ {
+        let source = self.spec.source;
+        let own = [
+            Prefix::Id(Address::Service(source)),
+            Prefix::Id(Address::EntityServices(source.entity)),
+        ];
+        own.into_iter().chain(self.prefixes.iter().cloned())
+    }
+
+    /// Whether a message to this address is for it.
+    pub(crate) fn receives(&self, address: &Address) -> bool {
+        let source = self.spec.source;
+        match address {
+            Address::Service(to) if *to == source => true,
+            Address::EntityServices(entity) | Address::Entity(entity) if *entity == source.entity => true,
+            _ => self.prefixes.iter().any(|prefix| prefix.matches(address)),
+        }
+    }
+
+    /// When it wants its deadline, or its restart.
+    pub(crate) fn next_deadline(&self) -> Option<Monotonic> {
+        [self.deadline, self.restart_at].into_iter().flatten().min()
+    }
+
+    pub(crate) fn wants_deadline(&self, now: Monotonic) -> bool {
+        self.deadline.is_some_and(|at| at <= now)
+    }
+
+    pub(crate) fn wants_restart(&self, now: Monotonic) -> bool {
+        self.restart_at.is_some_and(|at| at <= now)
+    }
+
+    fn crash(&mut self, now: Now, panic: &(dyn Any + Send)) -> Ran {
+        let text = panic_text(panic);
+        self.service = None;
+        self.deadline = None;
+        self.outbox.forget();
+        let ran = now.monotonic - self.started_at;
+        self.restart_delay = if ran >= MIN_RUN_TIME {
+            RESTART_DELAY_MIN
+        } else {
+            (self.restart_delay * 2).min(RESTART_DELAY_MAX)
+        };
+        self.restart_at = Some(now.monotonic + self.restart_delay);
+        self.outbox.note(Level::Error, format!("service {} crashed: {text}", self.spec.source));
+        Ran::Crashed(text)
+    }
+}
+
+/// What a panic said.
+pub(crate) fn panic_text(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "without a text".to_owned())
+}

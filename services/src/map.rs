@@ -1,0 +1,3 @@
+//! Pure translation between envelopes and what bridges speak.
+
+pub mod uxas;

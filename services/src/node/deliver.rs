@@ -1,0 +1,279 @@
+//! Where messages go: to services here, to peers of bridges, out on the bus.
+
+use super::{Node, Origin};
+use crate::event::{BridgeId, Effect, PeerId, PublisherId};
+use crate::labels::Entry;
+use crate::service::{Input, Level, refusal};
+use aldis_envelope::{
+    Address, Call, Change, Envelope, KeyHash, Label, Message, Now, Priority, Refusal, Role, ServiceId, Space, Stamp, aldis,
+};
+use std::sync::Arc;
+
+/// How many publishers are declared at the most: Zenoh keeps a route for each. Rarer keys are put on undeclared.
+pub const PUBLISHERS_MAX: usize = 2_000;
+
+impl Node {
+    /// A message that starts here: it is stamped, and goes everywhere.
+    pub(super) fn route(&mut self, now: Now, origin: Origin, message: Message, effects: &mut Vec<Effect>) {
+        let place = self.label(&message.label);
+        let (outgoing, publish) = self.outgoing(place);
+        let (sequence, skipped) = self.outbound.next(outgoing);
+        let stamp = Stamp {
+            node: self.entity(),
+            boot: self.config.boot,
+            sequence,
+            source_time: now.wall,
+            lifespan_left_ms: None,
+            priority: Priority::Data,
+            skipped,
+            via: Vec::new(),
+        };
+        let envelope = Envelope { message, stamp };
+        self.deliver_here(now, origin, place, &envelope, effects);
+        let elsewhere = publish && !self.is_for_a_service_here(&envelope.message.label.address);
+        if !elsewhere {
+            return;
+        }
+        if self.bus_is_open {
+            self.publish(place, envelope, effects);
+        } else {
+            self.outbound.held_back(outgoing, skipped);
+            self.counters.held_back_offline += 1;
+        }
+    }
+
+    /// A message from the bus.
+    pub(super) fn sample(&mut self, now: Now, envelope: &Envelope, effects: &mut Vec<Effect>) {
+        self.counters.received += 1;
+        if envelope.stamp.via.contains(&self.entity()) {
+            self.counters.loops_stopped += 1;
+            return;
+        }
+        let place = self.label(&envelope.message.label);
+        if !self.labels.entry(place).import || !self.accept(now, place, envelope, effects) {
+            return;
+        }
+        self.deliver_here(now, Origin::Bus, place, envelope, effects);
+    }
+
+    /// Looks at the sequence: false when the sample is old.
+    fn accept(&mut self, now: Now, place: usize, envelope: &Envelope, effects: &mut Vec<Effect>) -> bool {
+        let stamp = &envelope.stamp;
+        let entry = self.labels.entry(place);
+        let incoming = match entry.incoming {
+            Some((node, incoming)) if node == stamp.node => incoming,
+            _ => {
+                let label = &envelope.message.label;
+                let incoming = self.inbound.place(stamp, label.source(), &label.address);
+                entry.incoming = Some((stamp.node, incoming));
+                incoming
+            }
+        };
+        let Some(incoming) = incoming else { return true };
+        let Some(gap) = self.inbound.accept(incoming, stamp) else {
+            self.counters.duplicates += 1;
+            return false;
+        };
+        self.counters.lost += gap.lost;
+        self.counters.skipped_told += gap.told;
+        self.counters.missed_offline += gap.offline;
+        if gap.lost > 0 {
+            let label = &envelope.message.label;
+            let text = format!("{} samples of {} from {} were lost", gap.lost, label.address, label.source());
+            self.say(now, Level::Warning, "lost", text, effects);
+        }
+        true
+    }
+
+    /// Hands an envelope to the services and the bridges here that receive it.
+    fn deliver_here(&mut self, now: Now, origin: Origin, place: usize, envelope: &Envelope, effects: &mut Vec<Effect>) {
+        let source = envelope.message.label.source();
+        for i in 0..self.labels.entry(place).services.len() {
+            let service = self.labels.entry(place).services[i];
+            if origin != Origin::Service(service) && self.services[service].spec.source != source {
+                self.deliver(now, service, envelope, effects);
+            }
+        }
+        for i in 0..self.labels.entry(place).bridges.len() {
+            let bridge = self.labels.entry(place).bridges[i];
+            self.export(now, origin, bridge, envelope, effects);
+        }
+    }
+
+    fn deliver(&mut self, now: Now, service: usize, envelope: &Envelope, effects: &mut Vec<Effect>) {
+        match envelope.message.call.as_deref() {
+            None => {
+                self.counters.delivered += 1;
+                self.run(now, service, Input::Message(envelope), effects);
+            }
+            Some(Call { role: Role::Request { .. }, .. }) => self.request(now, service, envelope, effects),
+            Some(call) => self.answer(now, service, envelope, call, effects),
+        }
+    }
+
+    /// A request to a service here: asked for permission first. A ping is answered for every service.
+    fn request(&mut self, now: Now, service: usize, request: &Envelope, effects: &mut Vec<Effect>) {
+        let own = self.services[service].spec.source;
+        let label = &request.message.label;
+        if !self.services[service].is_running() {
+            return;
+        }
+        if let Err(why) = self.allow.check(label.source().entity, own.service, label.descriptor()) {
+            self.counters.calls_forbidden += 1;
+            let text = format!("a call of {} to {own} is refused: {why}", label.source());
+            self.say(now, Level::Warning, "forbidden", text, effects);
+            let refused = refusal(own, request, Refusal::NotAllowed(why));
+            self.work.extend(refused.map(|message| (Origin::Service(service), message)));
+        } else if label.descriptor() == aldis::PING {
+            let content = request.message.content.clone();
+            self.reply_as_host(service, request, aldis::PONG, content);
+        } else if own.service == ServiceId::NODE && label.descriptor() == aldis::NODE_QUERY {
+            let status = aldis::encode(&self.status(now)).into();
+            self.reply_as_host(service, request, aldis::NODE_STATUS, status);
+        } else {
+            self.counters.delivered += 1;
+            self.run(now, service, Input::Message(request), effects);
+        }
+    }
+
+    /// An answer goes to the one who called, if it still waits.
+    fn answer(&mut self, now: Now, service: usize, envelope: &Envelope, call: &Call, effects: &mut Vec<Effect>) {
+        let caller = self.services[service].spec.source;
+        if envelope.message.label.address != Address::Service(caller) {
+            return;
+        }
+        let from = envelope.message.label.source();
+        let Some(ended) = self.calls.answer(caller.service, from, call) else {
+            self.counters.replies_late += 1;
+            return;
+        };
+        if matches!(call.role, Role::Reply { .. }) {
+            self.counters.delivered += 1;
+            self.run(now, service, Input::Message(envelope), effects);
+        }
+        if let Some(ended) = ended {
+            self.call_ended(now, ended, effects);
+        }
+    }
+
+    fn export(&mut self, now: Now, origin: Origin, bridge: BridgeId, envelope: &Envelope, effects: &mut Vec<Effect>) {
+        let message = &envelope.message;
+        if message.change != Change::Put {
+            return;
+        }
+        for peer in self.bridges[bridge.0].peers() {
+            if origin != Origin::Peer(bridge, peer) {
+                self.send_to_peer(now, bridge, peer, &message.label, &message.content, effects);
+            }
+        }
+    }
+
+    pub(super) fn send_to_peer(
+        &mut self,
+        now: Now,
+        bridge: BridgeId,
+        peer: PeerId,
+        label: &Arc<Label>,
+        content: &bytes::Bytes,
+        effects: &mut Vec<Effect>,
+    ) {
+        use crate::bridge::Sent;
+        match self.bridges[bridge.0].send(now.monotonic, peer, label, content) {
+            Sent::Now => effects.push(Effect::Send(bridge, peer, label.clone(), content.clone())),
+            Sent::Later => {}
+            Sent::Shed => {
+                let name = &self.bridges[bridge.0].spec.name;
+                let text = format!("{name}: messages for {} are dropped", self.bridges[bridge.0].peer_name(peer));
+                self.say(now, Level::Warning, &text.clone(), text, effects);
+            }
+        }
+    }
+
+    fn publish(&mut self, place: usize, envelope: Envelope, effects: &mut Vec<Effect>) {
+        self.counters.published += 1;
+        let message = &envelope.message;
+        let (label, change) = (message.label.clone(), message.change);
+        let instance = message.instance.clone();
+        let on_a_writer_key = change == Change::Unregister;
+        let hash = instance.as_ref().map(|instance| instance.hash);
+        // A limitedcast's instance chunk needs the serialized key, which a publisher does not keep.
+        let plain = hash.is_none() || label.is_broadcast();
+        let publisher = if plain && !on_a_writer_key { self.publisher(place, &label, hash, effects) } else { None };
+        match publisher {
+            Some(publisher) => effects.push(Effect::Publish(publisher, envelope)),
+            None => {
+                let space = if on_a_writer_key { Space::Writer } else { Space::Data };
+                let key = self.keys.envelope(space, &label, instance.as_deref());
+                effects.push(Effect::PublishOn(key, envelope));
+            }
+        }
+    }
+
+    /// The publisher of a label and instance, declared at its first use; none when there are too many.
+    fn publisher(
+        &mut self,
+        place: usize,
+        label: &Arc<Label>,
+        instance: Option<KeyHash>,
+        effects: &mut Vec<Effect>,
+    ) -> Option<PublisherId> {
+        if let Some(&known) = self.labels.entry(place).publishers.get(&instance) {
+            return Some(known);
+        }
+        let next = PublisherId(self.publishers.len());
+        let known = self.publishers.get(&(label.clone(), instance)).copied();
+        let publisher = match known {
+            Some(publisher) => publisher,
+            None if next.0 >= PUBLISHERS_MAX => return None,
+            None => {
+                self.publishers.insert((label.clone(), instance), next);
+                effects.push(self.declare(label, instance, next));
+                next
+            }
+        };
+        self.labels.entry(place).publishers.insert(instance, publisher);
+        Some(publisher)
+    }
+
+    fn outgoing(&mut self, place: usize) -> (usize, bool) {
+        let entry = self.labels.entry(place);
+        let outgoing = match entry.outgoing {
+            Some(outgoing) => outgoing,
+            None => {
+                let outgoing = self.outbound.place(entry.label.source(), &entry.label.address);
+                entry.outgoing = Some(outgoing);
+                outgoing
+            }
+        };
+        (outgoing, entry.publish)
+    }
+
+    /// What is addressed to one service that runs here has arrived.
+    fn is_for_a_service_here(&self, address: &Address) -> bool {
+        let Address::Service(to) = address else { return false };
+        self.services.iter().any(|hosted| hosted.spec.source == *to && hosted.is_running())
+    }
+
+    fn label(&mut self, label: &Arc<Label>) -> usize {
+        if std::mem::take(&mut self.labels_are_stale) {
+            self.labels.forget();
+        }
+        if let Some(place) = self.labels.place(label) {
+            return place;
+        }
+        let address = &label.address;
+        let matches = |prefixes: &[aldis_envelope::Prefix]| prefixes.iter().any(|prefix| prefix.matches(address));
+        let services = (0..self.services.len()).filter(|&i| self.services[i].receives(address)).collect();
+        let bridges = (0..self.bridges.len()).filter(|&i| self.bridges[i].exports(label)).map(BridgeId).collect();
+        self.labels.insert(Entry {
+            label: label.clone(),
+            services,
+            bridges,
+            publish: matches(&self.config.export),
+            import: matches(&self.config.import),
+            outgoing: None,
+            incoming: None,
+            publishers: Default::default(),
+        })
+    }
+}

@@ -1,0 +1,219 @@
+//! The life of services inside a node: starts, crashes, deadlines, notes, the end.
+
+use super::{Node, Origin, WORK_MAX};
+use crate::event::Effect;
+use crate::host::Ran;
+use crate::service::{
+    Action, Component, ComponentHealth, Condition, Input, JobOutput, Level, Note,
+};
+use aldis_envelope::{Address, CallId, Message, Now, Refusal, ServiceId, Source};
+use std::time::Duration;
+
+impl Node {
+    pub(super) fn start_service(&mut self, now: Now, place: usize, effects: &mut Vec<Effect>) {
+        let ran = self.services[place].start(now);
+        let source = self.services[place].spec.source;
+        let running = self.services[place].is_running();
+        self.awake.push(place);
+        if running && self.bus_is_open {
+            effects.push(Effect::Token(source, true));
+        }
+        if ran == Ran::Well {
+            self.service_health(now, source, Condition::Well, "running");
+        } else {
+            self.after(now, place, ran, effects);
+        }
+        self.subscribe(effects);
+    }
+
+    /// Gives a service an input and looks after what comes of it.
+    pub(super) fn run(&mut self, now: Now, place: usize, input: Input<'_>, effects: &mut Vec<Effect>) {
+        let ran = self.services[place].run(now, input);
+        if self.awake.last() != Some(&place) {
+            self.awake.push(place);
+        }
+        if ran != Ran::Well {
+            self.after(now, place, ran, effects);
+        }
+    }
+
+    fn after(&mut self, now: Now, place: usize, ran: Ran, effects: &mut Vec<Effect>) {
+        let Ran::Crashed(text) = ran else { return };
+        let source = self.services[place].spec.source;
+        self.counters.crashes += 1;
+        if self.bus_is_open {
+            effects.push(Effect::Token(source, false));
+        }
+        self.service_health(now, source, Condition::Failed, &format!("crashed: {text}"));
+    }
+
+    /// Does what services want until none wants anything more.
+    pub(super) fn settle(&mut self, now: Now, effects: &mut Vec<Effect>) {
+        loop {
+            while let Some(place) = self.awake.pop() {
+                self.take_actions(now, place, effects);
+            }
+            let Some((origin, message)) = self.work.pop_front() else { return };
+            self.route(now, origin, message, effects);
+        }
+    }
+
+    fn take_actions(&mut self, now: Now, place: usize, effects: &mut Vec<Effect>) {
+        let source = self.services[place].spec.source;
+        let actions: Vec<_> = self.services[place].actions().collect();
+        for action in actions {
+            match action {
+                Action::Send(message) => self.take_message(now, place, source, message, effects),
+                Action::Call(message, within) => self.open_call(now, place, message, within, effects),
+                Action::Job(number, job) => effects.push(Effect::Job(source, number, job)),
+                Action::Note(note) => self.note(now, note, effects),
+                Action::Retire => {
+                    self.services[place].retire();
+                    if self.bus_is_open {
+                        effects.push(Effect::Token(source, false));
+                    }
+                    self.service_health(now, source, Condition::Degraded, "retired");
+                    self.subscribe(effects);
+                }
+            }
+        }
+    }
+
+    fn take_message(
+        &mut self,
+        now: Now,
+        place: usize,
+        source: Source,
+        message: Message,
+        effects: &mut Vec<Effect>,
+    ) {
+        let claimed = message.label.source();
+        if claimed != source {
+            self.counters.refused_sources += 1;
+            let text = format!("service {source} tried to send as {claimed}: refused");
+            self.say(now, Level::Error, "refused source", text, effects);
+        } else if self.work.len() >= WORK_MAX {
+            self.counters.shed_inside += 1;
+            let text = format!("more than {WORK_MAX} messages wait inside the node: those of {source} are dropped");
+            self.say(now, Level::Error, "shed inside", text, effects);
+        } else {
+            self.work.push_back((Origin::Service(place), message));
+        }
+    }
+
+    fn open_call(&mut self, now: Now, place: usize, message: Message, within: Duration, effects: &mut Vec<Effect>) {
+        let Some(id) = message.call.as_ref().map(|call| call.id) else { return };
+        let (source, to) = (message.label.source(), message.label.address.clone());
+        let here = matches!(&to, Address::Service(s) if self.is_alive_here(*s));
+        let nobody = crate::calls::Alive::default();
+        let alive = if here { &nobody } else { &self.alive };
+        match self.calls.open(source.service, id, &to, now.monotonic + within, alive) {
+            Ok(()) if !here && !self.alive.is_known() => self.waiting_calls.push((place, message)),
+            Ok(()) => self.take_message(now, place, source, message, effects),
+            Err(reason) => self.call_ended(now, (source.service, id, Err(reason)), effects),
+        }
+    }
+
+    /// The tokens are told: the requests that waited for them go out, but those that nobody waits for any more.
+    pub(super) fn send_waiting_calls(&mut self) {
+        for (place, message) in std::mem::take(&mut self.waiting_calls) {
+            let id = message.call.as_ref().map(|call| call.id);
+            if id.is_some_and(|id| self.calls.is_open(message.label.source().service, id)) {
+                self.work.push_back((Origin::Service(place), message));
+            }
+        }
+    }
+
+    fn is_alive_here(&self, source: Source) -> bool {
+        self.sources_running().any(|running| running == source)
+    }
+
+    pub(super) fn call_ended(
+        &mut self,
+        now: Now,
+        (caller, id, outcome): (ServiceId, CallId, Result<(), Refusal>),
+        effects: &mut Vec<Effect>,
+    ) {
+        match outcome {
+            Ok(()) => self.counters.calls_answered += 1,
+            Err(_) => self.counters.calls_failed += 1,
+        }
+        if let Some(place) = self.services.iter().position(|h| h.spec.source.service == caller) {
+            self.run(now, place, Input::CallEnded(id, outcome), effects);
+        }
+    }
+
+    pub(super) fn tokens_changed(&mut self, now: Now, effects: &mut Vec<Effect>) {
+        for ended in self.calls.tokens_changed(&self.alive) {
+            self.call_ended(now, ended, effects);
+        }
+    }
+
+    pub(super) fn deadline(&mut self, now: Now, effects: &mut Vec<Effect>) {
+        self.armed = None;
+        for ended in self.calls.expire(now.monotonic) {
+            self.call_ended(now, ended, effects);
+        }
+        for place in 0..self.services.len() {
+            if self.services[place].wants_restart(now.monotonic) {
+                self.start_service(now, place, effects);
+            }
+            if self.services[place].wants_deadline(now.monotonic) {
+                self.run(now, place, Input::Deadline, effects);
+            }
+        }
+        self.give_up_stalled_peers(now, effects);
+    }
+
+    pub(super) fn job_done(
+        &mut self,
+        now: Now,
+        source: Source,
+        number: u64,
+        result: Result<JobOutput, String>,
+        effects: &mut Vec<Effect>,
+    ) {
+        if let Some(place) = self.services.iter().position(|h| h.spec.source == source) {
+            self.run(now, place, Input::Job(number, result), effects);
+        }
+    }
+
+    fn service_health(&mut self, now: Now, source: Source, condition: Condition, status: &str) {
+        let component = Component::Service(source);
+        self.component(now, &ComponentHealth { component, condition, status: status.to_owned() });
+    }
+
+    /// Tells the health service. A crash of the health service itself cannot be told this way, and is noted anyhow.
+    pub(super) fn component(&mut self, now: Now, health: &ComponentHealth) {
+        if let Some(place) = self.service_at(ServiceId::HEALTH) {
+            let ran = self.services[place].run(now, Input::Component(health));
+            self.counters.crashes += u64::from(ran != Ran::Well);
+            self.awake.push(place);
+        }
+    }
+
+    pub(super) fn note(&mut self, now: Now, note: Note, effects: &mut Vec<Effect>) {
+        if let Some(place) = self.service_at(ServiceId::LOG) {
+            let ran = self.services[place].run(now, Input::Note(&note));
+            self.counters.crashes += u64::from(ran != Ran::Well);
+            self.awake.push(place);
+        }
+        effects.push(Effect::Say(note));
+    }
+
+    pub(super) fn shutdown(&mut self, now: Now, effects: &mut Vec<Effect>) {
+        if std::mem::replace(&mut self.ending, true) {
+            return;
+        }
+        // The built-in services come first in the configuration and speak last.
+        for place in (0..self.services.len()).rev() {
+            self.run(now, place, Input::Shutdown, effects);
+            self.settle(now, effects);
+        }
+        if self.bus_is_open {
+            let running: Vec<_> = self.sources_running().collect();
+            effects.extend(running.into_iter().map(|source| Effect::Token(source, false)));
+        }
+        effects.push(Effect::Exit);
+    }
+}

@@ -1,0 +1,60 @@
+//! Every service that a node can run, by its kind. A new service is one line here.
+
+use crate::health::Health;
+use crate::log::Log;
+use crate::service::{Input, Outbox, Service, ServiceSpec};
+use crate::sim::vehicle::{Track, TrackConfig};
+use aldis_envelope::{EntityId, Guids, Now, ServiceId, Source};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// A kind of service with its settings.
+#[derive(Debug, Clone)]
+pub enum Kind {
+    /// Service 1, the node: the host answers for it.
+    Node,
+    /// Service 2.
+    Health {
+        /// How often what it reports is repeated.
+        period: Duration,
+    },
+    /// Service 3.
+    Log,
+    /// A vehicle that moves along a simple track and tells where it is.
+    Track(TrackConfig),
+}
+
+/// The node's own service is its host, which answers before a message gets here.
+struct NodeService;
+
+impl Service for NodeService {
+    fn handle(&mut self, _: Now, input: Input<'_>, out: &mut Outbox) {
+        if let Input::Message(envelope) = input {
+            let what = envelope.message.label.descriptor().to_owned();
+            out.refuse(envelope, aldis_envelope::Refusal::NotUnderstood(what));
+        }
+    }
+}
+
+/// The services that every node has.
+pub fn built_in(entity: EntityId, guids: &Guids, health_period: Duration) -> Vec<ServiceSpec> {
+    vec![
+        service(Source::new(entity, ServiceId::NODE), "node", Kind::Node, guids),
+        service(Source::new(entity, ServiceId::LOG), "log", Kind::Log, guids),
+        service(Source::new(entity, ServiceId::HEALTH), "health", Kind::Health { period: health_period }, guids),
+    ]
+}
+
+/// A service to run.
+pub fn service(source: Source, name: &str, kind: Kind, guids: &Guids) -> ServiceSpec {
+    let guids = guids.clone();
+    let factory = Arc::new(move || -> Box<dyn Service> {
+        match &kind {
+            Kind::Node => Box::new(NodeService),
+            Kind::Health { period } => Box::new(Health::new(source.entity, guids.clone(), *period)),
+            Kind::Log => Box::new(Log::new(source.entity, &guids)),
+            Kind::Track(track) => Box::new(Track::new(source, track.clone())),
+        }
+    });
+    ServiceSpec { source, name: name.to_owned(), factory }
+}

@@ -1,0 +1,122 @@
+//! What a service is: subscriptions, inputs, an outbox and a next deadline. A service knows nothing else of the world.
+
+mod outbox;
+
+pub use outbox::{Action, Outbox};
+pub(crate) use outbox::refusal;
+
+use aldis_envelope::{CallId, Envelope, Monotonic, Now, Prefix, Refusal, Source};
+use std::any::Any;
+use std::sync::Arc;
+
+/// A service. It runs on one thread at a time, and only when it gets an input.
+pub trait Service: Send {
+    /// What it receives beside what is addressed to it, to its entity and to all services of its entity.
+    fn subscriptions(&self) -> Vec<Prefix> {
+        Vec::new()
+    }
+
+    /// Takes one input. What it puts into the outbox is sent after it returns; it never gets its own messages back.
+    fn handle(&mut self, now: Now, input: Input<'_>, out: &mut Outbox);
+
+    /// When it wants [`Input::Deadline`] next; asked after each input.
+    fn next_deadline(&self) -> Option<Monotonic> {
+        None
+    }
+}
+
+/// What happens to a service.
+#[derive(Debug)]
+pub enum Input<'a> {
+    /// It has been started, or started again after a crash.
+    Started,
+    /// A message that it subscribed to or that is addressed to it; requests and replies of calls too.
+    Message(&'a Envelope),
+    /// A call of its own has ended: with answers (each came as a message), or with the reason why there are none.
+    CallEnded(CallId, Result<(), Refusal>),
+    /// The deadline that it asked for has come.
+    Deadline,
+    /// A job of its own is done, or panicked with this text.
+    Job(u64, Result<JobOutput, String>),
+    /// The health of a part of the node changed. Only the health service gets it.
+    Component(&'a ComponentHealth),
+    /// The node itself has something to say. Only the log service gets it.
+    Note(&'a Note),
+    /// The node shuts down: last words.
+    Shutdown,
+}
+
+/// What a job returns.
+pub type JobOutput = Box<dyn Any + Send>;
+/// A computation that leaves the loop: a pure function, cut by a budget of steps and never by time.
+pub type Job = Box<dyn FnOnce() -> JobOutput + Send>;
+/// Makes a service, at the start and after each crash.
+pub type Factory = Arc<dyn Fn() -> Box<dyn Service> + Send + Sync>;
+
+/// A service to run.
+#[derive(Clone)]
+pub struct ServiceSpec {
+    /// Its ids.
+    pub source: Source,
+    /// What it is, for people.
+    pub name: String,
+    /// Makes it.
+    pub factory: Factory,
+}
+
+impl std::fmt::Debug for ServiceSpec {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} ({})", self.source, self.name)
+    }
+}
+
+/// How a part of a node does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Condition {
+    /// All is well.
+    Well,
+    /// It works, but somebody should look at it.
+    Degraded,
+    /// It does not work.
+    Failed,
+}
+
+/// The health of a part of the node: a service, a bridge, the bus, the disk.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ComponentHealth {
+    /// Which part.
+    pub component: Component,
+    /// How it does.
+    pub condition: Condition,
+    /// In words, for people.
+    pub status: String,
+}
+
+/// A part of a node whose health is reported.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Component {
+    /// A service or a bridge.
+    Service(Source),
+    /// Something without a service id: `bus`, `disk`.
+    Resource(&'static str),
+}
+
+/// How serious a note is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Level {
+    /// Worth knowing.
+    Information,
+    /// Worth a look.
+    Warning,
+    /// Something failed.
+    Error,
+}
+
+/// Something worth saying to people.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Note {
+    /// How serious it is.
+    pub level: Level,
+    /// In words.
+    pub text: String,
+}

@@ -1,0 +1,124 @@
+//! What a service wants done, in the order in which it said so.
+
+use super::{Job, Level, Note};
+use aldis_envelope::{
+    Address, Call, CallId, ContentType, Descriptor, Envelope, Label, Message, Name, Refusal, Role, Source,
+};
+use bytes::Bytes;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// One wish of a service.
+pub enum Action {
+    /// Send a message.
+    Send(Message),
+    /// Send a request and wait for its answers for so long.
+    Call(Message, Duration),
+    /// Compute something outside the loop; the number comes back with the result.
+    Job(u64, Job),
+    /// Say something to people.
+    Note(Note),
+    /// End this service.
+    Retire,
+}
+
+/// Takes the wishes of a service while it handles an input.
+pub struct Outbox {
+    source: Source,
+    next_call: u64,
+    actions: Vec<Action>,
+}
+
+impl Outbox {
+    pub(crate) fn new(source: Source) -> Self {
+        Self { source, next_call: 1, actions: Vec::new() }
+    }
+
+    /// The ids of the service itself.
+    pub fn source(&self) -> Source {
+        self.source
+    }
+
+    /// Sends a message. Its source must be the service's own: others are refused and noted.
+    pub fn send(&mut self, message: Message) {
+        self.actions.push(Action::Send(message));
+    }
+
+    /// Sends a request and waits for answers at most `within`. The answers come as messages, then
+    /// [`Input::CallEnded`](super::Input::CallEnded) says how it ended.
+    pub fn call(
+        &mut self,
+        to: Address,
+        content_type: ContentType,
+        descriptor: Descriptor,
+        content: Bytes,
+        within: Duration,
+    ) -> CallId {
+        let id = CallId(self.next_call);
+        self.next_call += 1;
+        let label = Label::limitedcast(to, content_type, descriptor, self.source);
+        let time_left_ms = u32::try_from(within.as_millis()).unwrap_or(u32::MAX);
+        let call = Some(Box::new(Call { id, role: Role::Request { time_left_ms } }));
+        self.actions.push(Action::Call(Message { call, ..Message::new(Arc::new(label), content) }, within));
+        id
+    }
+
+    /// Answers a request; does nothing where the message is none. `last` says that no more answers follow from here.
+    pub fn reply(&mut self, request: &Envelope, content_type: ContentType, descriptor: Name, content: Bytes, last: bool) {
+        if let Some(id) = request_id(request) {
+            let to = Address::Service(request.message.label.source());
+            let label = Label::limitedcast(to, content_type, descriptor.into(), self.source);
+            let call = Some(Box::new(Call { id, role: Role::Reply { last } }));
+            self.send(Message { call, ..Message::new(Arc::new(label), content) });
+        }
+    }
+
+    /// Refuses a request with a reason; does nothing where the message is none.
+    pub fn refuse(&mut self, request: &Envelope, reason: Refusal) {
+        if let Some(message) = refusal(self.source, request, reason) {
+            self.send(message);
+        }
+    }
+
+    /// Has something computed outside the loop.
+    pub fn job(&mut self, number: u64, job: Job) {
+        self.actions.push(Action::Job(number, job));
+    }
+
+    /// Says something to people.
+    pub fn note(&mut self, level: Level, text: impl Into<String>) {
+        self.actions.push(Action::Note(Note { level, text: text.into() }));
+    }
+
+    /// Ends this service after this input.
+    pub fn retire(&mut self) {
+        self.actions.push(Action::Retire);
+    }
+
+    pub(crate) fn drain(&mut self) -> std::vec::Drain<'_, Action> {
+        self.actions.drain(..)
+    }
+
+    pub(crate) fn forget(&mut self) {
+        self.actions.clear();
+    }
+}
+
+fn request_id(request: &Envelope) -> Option<CallId> {
+    match request.message.call.as_deref() {
+        Some(Call { id, role: Role::Request { .. } }) => Some(*id),
+        _ => None,
+    }
+}
+
+/// The message that refuses a request, from one of the services it was addressed to.
+pub(crate) fn refusal(from: Source, request: &Envelope, reason: Refusal) -> Option<Message> {
+    let id = request_id(request)?;
+    let label = &request.message.label;
+    let attributes = &label.attributes;
+    let to = Address::Service(label.source());
+    let refused =
+        Label::limitedcast(to, attributes.content_type.clone(), attributes.descriptor.clone(), from);
+    let call = Some(Box::new(Call { id, role: Role::Refused { reason } }));
+    Some(Message { call, ..Message::new(Arc::new(refused), Bytes::new()) })
+}
