@@ -1,1 +1,3 @@
 //! Envelopes.
+
+pub mod lmcp;
