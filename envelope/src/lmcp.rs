@@ -5,6 +5,7 @@ mod declare;
 
 mod container;
 mod error;
+mod json;
 mod key;
 mod list;
 mod object;
@@ -14,6 +15,7 @@ mod reference;
 mod registry;
 mod schema;
 mod value;
+mod verify;
 mod writer;
 
 pub mod cmasi;
@@ -29,6 +31,7 @@ mod tests;
 
 pub use container::{CONTAINER, MAGIC, checksum, decode, decode_as, encode, encode_into};
 pub use error::{DecodeError, DecodeFault, EncodeError, EncodeFault, FieldPath};
+pub use json::{JsonError, JsonFault, from_json, to_json};
 pub use key::{KEYED, Keyed, key_of, natural_key};
 pub use list::LargeArray;
 pub use object::{Object, Struct};
@@ -38,4 +41,5 @@ pub use reference::Ref;
 pub use registry::{descendants, series_named, type_in, type_of, types};
 pub use schema::{Count, EnumInfo, FieldInfo, Kind, Series, SeriesName, TypeInfo};
 pub use value::{Enumeration, List, Reference, Slot, Value, View};
+pub use verify::{Verification, verify};
 pub use writer::{Encoded, Writer};

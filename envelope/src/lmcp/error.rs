@@ -23,6 +23,20 @@ impl DecodeError {
         Self { fault, offset, path: FieldPath::default() }
     }
 
+    /// The same error, seen from the object that has the field.
+    #[cold]
+    pub(super) fn in_field(mut self: Box<Self>, name: &'static str) -> Box<Self> {
+        self.path.push_field(name);
+        self
+    }
+
+    /// The same error, seen from the array that has the element.
+    #[cold]
+    pub(super) fn in_element(mut self: Box<Self>, index: usize) -> Box<Self> {
+        self.path.push_index(index);
+        self
+    }
+
     /// Whether the message may be sound, only its type or version is not known here: such a message
     /// is carried opaque.
     pub fn is_unknown_type(&self) -> bool {
@@ -137,6 +151,20 @@ impl EncodeError {
     pub(super) fn new(fault: EncodeFault) -> Self {
         Self { fault, path: FieldPath::default() }
     }
+
+    /// The same error, seen from the object that has the field.
+    #[cold]
+    pub(super) fn in_field(mut self: Box<Self>, name: &'static str) -> Box<Self> {
+        self.path.push_field(name);
+        self
+    }
+
+    /// The same error, seen from the array that has the element.
+    #[cold]
+    pub(super) fn in_element(mut self: Box<Self>, index: usize) -> Box<Self> {
+        self.path.push_index(index);
+        self
+    }
 }
 
 /// What the wire cannot carry.
@@ -180,11 +208,11 @@ impl FieldPath {
         self.steps.is_empty()
     }
 
-    pub(super) fn within_field(&mut self, name: &'static str) {
+    pub(super) fn push_field(&mut self, name: &'static str) {
         self.steps.push(Step::Field(name));
     }
 
-    pub(super) fn within_index(&mut self, index: usize) {
+    pub(super) fn push_index(&mut self, index: usize) {
         self.steps.push(Step::Index(index));
     }
 }

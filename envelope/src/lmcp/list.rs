@@ -75,7 +75,7 @@ impl<T: Value, const N: usize> Value for [T; N] {
         std::array::from_fn(|_| T::blank())
     }
     fn decode(&mut self, reader: &mut Reader<'_>) -> Decoded<()> {
-        self.iter_mut().enumerate().try_for_each(|(index, element)| decode_element(element, index, reader))
+        decode_in_place(self, reader)
     }
     fn encode(&self, writer: &mut Writer<'_>) -> Encoded {
         encode_elements(self, writer)
@@ -127,27 +127,20 @@ fn decode_elements<T: Value>(list: &mut Vec<T>, count: usize, reader: &mut Reade
     reader.allocate(count.saturating_mul(size_of::<T>()))?;
     list.clear();
     list.reserve_exact(count);
-    for index in 0..count {
-        let mut element = T::blank();
-        decode_element(&mut element, index, reader)?;
-        list.push(element);
+    list.resize_with(count, T::blank);
+    decode_in_place(list, reader)
+}
+
+fn decode_in_place<T: Value>(list: &mut [T], reader: &mut Reader<'_>) -> Decoded<()> {
+    for (index, element) in list.iter_mut().enumerate() {
+        element.decode(reader).map_err(|error| error.in_element(index))?;
     }
     Ok(())
 }
 
-#[inline]
-fn decode_element<T: Value>(element: &mut T, index: usize, reader: &mut Reader<'_>) -> Decoded<()> {
-    element.decode(reader).map_err(|mut error| {
-        error.path.within_index(index);
-        error
-    })
-}
-
 fn encode_elements<T: Value>(list: &[T], writer: &mut Writer<'_>) -> Encoded {
-    list.iter().enumerate().try_for_each(|(index, element)| {
-        element.encode(writer).map_err(|mut error| {
-            error.path.within_index(index);
-            error
-        })
-    })
+    for (index, element) in list.iter().enumerate() {
+        element.encode(writer).map_err(|error| error.in_element(index))?;
+    }
+    Ok(())
 }

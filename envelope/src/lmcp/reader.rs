@@ -61,7 +61,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The next `N` bytes.
-    #[inline]
+    #[inline(always)]
     pub(super) fn array<const N: usize>(&mut self) -> Decoded<[u8; N]> {
         match self.rest.split_first_chunk() {
             Some((bytes, rest)) => {
@@ -105,12 +105,12 @@ impl<'a> Reader<'a> {
     }
 
     /// A field of an object; an error names it.
-    #[inline]
+    #[inline(always)]
     pub fn field<T: Value>(&mut self, name: &'static str, value: &mut T) -> Decoded<()> {
-        value.decode(self).map_err(|mut error| {
-            error.path.within_field(name);
-            error
-        })
+        match value.decode(self) {
+            Ok(()) => Ok(()),
+            Err(error) => Err(error.in_field(name)),
+        }
     }
 
     /// Accounts for `bytes` to be allocated.
@@ -152,12 +152,8 @@ impl<'a> Reader<'a> {
         if !self.flag(DecodeFault::Presence)? {
             return Ok(None);
         }
-        let [s0, s1, s2, s3, s4, s5, s6, s7, t0, t1, t2, t3, v0, v1] = self.array()?;
-        Ok(Some(Header {
-            series: SeriesName(u64::from_be_bytes([s0, s1, s2, s3, s4, s5, s6, s7])),
-            type_id: u32::from_be_bytes([t0, t1, t2, t3]),
-            version: u16::from_be_bytes([v0, v1]),
-        }))
+        let series = SeriesName(u64::from_be_bytes(self.array()?));
+        Ok(Some(Header { series, type_id: self.u32()?, version: self.u16()? }))
     }
 }
 

@@ -109,12 +109,12 @@ macro_rules! number {
             fn blank() -> Self {
                 Self::default()
             }
-            #[inline]
+            #[inline(always)]
             fn decode(&mut self, reader: &mut Reader<'_>) -> Decoded<()> {
                 *self = Self::from_be_bytes(reader.array()?);
                 Ok(())
             }
-            #[inline]
+            #[inline(always)]
             fn encode(&self, writer: &mut Writer<'_>) -> Encoded {
                 writer.put(&self.to_be_bytes());
                 Ok(())

@@ -53,12 +53,12 @@ impl<'a> Writer<'a> {
     }
 
     /// A field of an object; an error names it.
-    #[inline]
+    #[inline(always)]
     pub fn field<T: Value>(&mut self, name: &'static str, value: &T) -> Encoded {
-        value.encode(self).map_err(|mut error| {
-            error.path.within_field(name);
-            error
-        })
+        match value.encode(self) {
+            Ok(()) => Ok(()),
+            Err(error) => Err(error.in_field(name)),
+        }
     }
 
     /// Writes what is inside an object.

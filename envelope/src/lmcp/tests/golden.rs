@@ -2,7 +2,9 @@
 
 use super::{files, golden_messages, read, shared};
 use crate::lmcp::cmasi::{AirVehicleState, AltitudeType};
-use crate::lmcp::{Header, decode, decode_as, encode, key_of, natural_key, position, type_of, types};
+use crate::lmcp::{
+    Header, decode, decode_as, encode, from_json, key_of, natural_key, position, type_of, types, verify,
+};
 
 #[test]
 fn every_message_comes_back_as_the_same_bytes() {
@@ -65,4 +67,17 @@ fn a_state_is_read_by_field() {
     assert_eq!(state.location.get().unwrap().altitude_type, AltitudeType::AGL);
     assert_eq!(state.payload_state_list.len(), 2);
     assert_eq!(state.wind_direction, -73.1);
+}
+
+#[test]
+fn every_message_equals_the_json_beside_it_both_ways() {
+    let Some(folder) = shared("lmcp") else { return };
+    for path in files(&folder, "lmcp") {
+        let message = read(&path);
+        let json: serde_json::Value = serde_json::from_slice(&read(&path.with_extension("json"))).unwrap();
+        let verification = verify(&message, &json).unwrap();
+        assert!(verification.identical && verification.fields_equal, "{verification:?}");
+        let object = from_json(&json["object"]).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        assert_eq!(encode(object.as_ref()).unwrap(), message, "{}", path.display());
+    }
 }

@@ -11,7 +11,7 @@ use crate::lmcp::{
 
 /// Everything that reads bytes.
 fn read_by_all(message: &[u8]) {
-    let header = Header::peek(message).and_then(|it| Ok(it.type_info().map(|info| info.full_name)));
+    let header = Header::peek(message).map(|it| it.type_info().map(|info| info.full_name));
     let descriptor = header.ok().and_then(Result::ok).unwrap_or("none");
     let _ = (position(message), natural_key(descriptor, message));
     if let Ok(object) = decode(message) {
@@ -47,9 +47,9 @@ fn a_message_cut_anywhere_is_an_error() {
 fn a_message_wrong_in_any_byte_does_no_harm() {
     for message in golden_messages() {
         for position in 8..message.len() - 4 {
-            for value in [0, 1, 0x7f, 0xff] {
+            for change in [0x01, 0xff] {
                 let mut wrong = message.clone();
-                wrong[position] = value;
+                wrong[position] ^= change;
                 mend(&mut wrong);
                 read_by_all(&wrong);
             }
@@ -115,7 +115,7 @@ fn the_container_is_checked() {
 #[test]
 fn a_checksum_is_the_sum_of_all_bytes() {
     let bytes: Vec<u8> = (0..1000_u32).map(|i| (i * 7) as u8 | 0x80).collect();
-    assert_eq!(checksum(&bytes), bytes.iter().map(|&byte| u32::from(byte)).sum());
+    assert_eq!(checksum(&bytes), bytes.iter().map(|&byte| u32::from(byte)).sum::<u32>());
     assert_eq!(checksum(&[0xff; 129]), 129 * 255);
 }
 
