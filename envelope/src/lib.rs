@@ -10,6 +10,7 @@ pub mod codec;
 pub mod guid;
 pub mod id;
 pub mod key;
+pub mod lmcp;
 pub mod message;
 pub mod name;
 pub mod prefix;

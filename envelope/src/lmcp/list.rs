@@ -1,0 +1,146 @@
+//! Arrays: counted in 16 bits, in 32, or of a fixed length.
+
+use std::ops::{Deref, DerefMut};
+
+use super::reader::{Decoded, Reader};
+use super::schema::{Count, Kind};
+use super::value::{List, Slot, Value, View};
+use super::writer::{Encoded, Writer};
+
+/// An array that the model allows to have more than 65 535 elements: its count takes 32 bits.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LargeArray<T>(pub Vec<T>);
+
+impl<T> Deref for LargeArray<T> {
+    type Target = Vec<T>;
+    fn deref(&self) -> &Vec<T> {
+        &self.0
+    }
+}
+
+impl<T> DerefMut for LargeArray<T> {
+    fn deref_mut(&mut self) -> &mut Vec<T> {
+        &mut self.0
+    }
+}
+
+impl<T: Value> Value for Vec<T> {
+    const KIND: Kind = Kind::List(&T::KIND, Count::U16);
+    const SIZE_MIN: usize = 2;
+    fn blank() -> Self {
+        Self::new()
+    }
+    fn decode(&mut self, reader: &mut Reader<'_>) -> Decoded<()> {
+        let count = reader.u16()?.into();
+        decode_elements(self, count, reader)
+    }
+    fn encode(&self, writer: &mut Writer<'_>) -> Encoded {
+        writer.count16(self.len())?;
+        encode_elements(self, writer)
+    }
+    fn view(&self) -> View<'_> {
+        View::List(self)
+    }
+    fn slot(&mut self) -> Slot<'_> {
+        Slot::List(self)
+    }
+}
+
+impl<T: Value> Value for LargeArray<T> {
+    const KIND: Kind = Kind::List(&T::KIND, Count::U32);
+    const SIZE_MIN: usize = 4;
+    fn blank() -> Self {
+        Self(Vec::new())
+    }
+    fn decode(&mut self, reader: &mut Reader<'_>) -> Decoded<()> {
+        let count = reader.u32()? as usize;
+        decode_elements(&mut self.0, count, reader)
+    }
+    fn encode(&self, writer: &mut Writer<'_>) -> Encoded {
+        writer.count32(self.len())?;
+        encode_elements(self, writer)
+    }
+    fn view(&self) -> View<'_> {
+        View::List(&self.0)
+    }
+    fn slot(&mut self) -> Slot<'_> {
+        Slot::List(&mut self.0)
+    }
+}
+
+impl<T: Value, const N: usize> Value for [T; N] {
+    const KIND: Kind = Kind::List(&T::KIND, Count::Fixed(N));
+    const SIZE_MIN: usize = T::SIZE_MIN * N;
+    fn blank() -> Self {
+        std::array::from_fn(|_| T::blank())
+    }
+    fn decode(&mut self, reader: &mut Reader<'_>) -> Decoded<()> {
+        decode_in_place(self, reader)
+    }
+    fn encode(&self, writer: &mut Writer<'_>) -> Encoded {
+        encode_elements(self, writer)
+    }
+    fn view(&self) -> View<'_> {
+        View::List(self)
+    }
+    fn slot(&mut self) -> Slot<'_> {
+        Slot::List(self)
+    }
+}
+
+impl<T: Value> List for Vec<T> {
+    fn length(&self) -> usize {
+        self.len()
+    }
+    fn element(&self, index: usize) -> Option<View<'_>> {
+        self.get(index).map(T::view)
+    }
+    fn clear(&mut self) {
+        self.clear();
+    }
+    fn place(&mut self, index: usize) -> Option<Slot<'_>> {
+        if index == self.len() {
+            self.push(T::blank());
+        }
+        self.get_mut(index).map(T::slot)
+    }
+}
+
+impl<T: Value, const N: usize> List for [T; N] {
+    fn length(&self) -> usize {
+        N
+    }
+    fn element(&self, index: usize) -> Option<View<'_>> {
+        self.get(index).map(T::view)
+    }
+    fn clear(&mut self) {
+        *self = Self::blank();
+    }
+    fn place(&mut self, index: usize) -> Option<Slot<'_>> {
+        self.get_mut(index).map(T::slot)
+    }
+}
+
+/// Reads `count` elements, once the bytes that are left and the memory allowed can hold them.
+fn decode_elements<T: Value>(list: &mut Vec<T>, count: usize, reader: &mut Reader<'_>) -> Decoded<()> {
+    reader.bound(count, T::SIZE_MIN)?;
+    reader.allocate(count.saturating_mul(size_of::<T>()))?;
+    list.clear();
+    list.reserve_exact(count);
+    list.resize_with(count, T::blank);
+    decode_in_place(list, reader)
+}
+
+fn decode_in_place<T: Value>(list: &mut [T], reader: &mut Reader<'_>) -> Decoded<()> {
+    for (index, element) in list.iter_mut().enumerate() {
+        element.decode(reader).map_err(|error| error.in_element(index))?;
+    }
+    Ok(())
+}
+
+fn encode_elements<T: Value>(list: &[T], writer: &mut Writer<'_>) -> Encoded {
+    for (index, element) in list.iter().enumerate() {
+        element.encode(writer).map_err(|error| error.in_element(index))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,172 @@
+//! Reads wire values from bytes, within bounds of length, depth and memory.
+
+use super::error::{DecodeError, DecodeFault};
+use super::schema::SeriesName;
+use super::value::Value;
+
+/// Result of reading one value. The error is boxed so that success stays small.
+pub type Decoded<T> = Result<T, Box<DecodeError>>;
+
+/// How deep objects may be nested. The model's deepest sound chain, a plan response with its
+/// missions, waypoints, actions and places, has six; more only come from actions put into places of
+/// actions, which an attacker can repeat until the stack ends.
+pub const DEPTH_MAX: u8 = 16;
+
+/// Bytes of decoded form that one byte of a message may take. A null in an array is one byte on the
+/// wire and some dozens in memory; no array of real objects takes more than three for one.
+pub const MEMORY_FACTOR: usize = 4;
+
+/// Bytes of decoded form that any message may take, however short it is.
+pub const MEMORY_FLOOR: usize = 64 * 1024;
+
+/// A cursor over the bytes of a message.
+#[derive(Debug)]
+pub struct Reader<'a> {
+    rest: &'a [u8],
+    /// Offset of the end of `rest`, from where offsets are counted.
+    end: usize,
+    depth: u8,
+    /// Bytes that may still be allocated.
+    memory: usize,
+}
+
+impl<'a> Reader<'a> {
+    /// Reads `bytes`, which begin at `offset` of the message.
+    pub(super) fn new(bytes: &'a [u8], offset: usize) -> Self {
+        let memory = bytes.len().saturating_mul(MEMORY_FACTOR).max(MEMORY_FLOOR);
+        Self { rest: bytes, end: offset + bytes.len(), depth: 0, memory }
+    }
+
+    /// Bytes not yet read.
+    pub fn left(&self) -> usize {
+        self.rest.len()
+    }
+
+    /// An error at the cursor.
+    #[cold]
+    pub(super) fn fail<T>(&self, fault: DecodeFault) -> Decoded<T> {
+        self.fail_back(0, fault)
+    }
+
+    /// An error `back` bytes before the cursor.
+    #[cold]
+    pub(super) fn fail_back<T>(&self, back: usize, fault: DecodeFault) -> Decoded<T> {
+        Err(Box::new(DecodeError::new(fault, self.end - self.rest.len() - back)))
+    }
+
+    /// An error at the beginning of the header that was just read.
+    #[cold]
+    pub(super) fn fail_header<T>(&self, fault: DecodeFault) -> Decoded<T> {
+        self.fail_back(HEADER, fault)
+    }
+
+    /// The next `N` bytes.
+    #[inline(always)]
+    pub(super) fn array<const N: usize>(&mut self) -> Decoded<[u8; N]> {
+        match self.rest.split_first_chunk() {
+            Some((bytes, rest)) => {
+                self.rest = rest;
+                Ok(*bytes)
+            }
+            None => self.fail(DecodeFault::Truncated { needed: N, left: self.left() }),
+        }
+    }
+
+    /// The next `count` bytes.
+    #[inline]
+    pub(super) fn bytes(&mut self, count: usize) -> Decoded<&'a [u8]> {
+        match self.rest.split_at_checked(count) {
+            Some((bytes, rest)) => {
+                self.rest = rest;
+                Ok(bytes)
+            }
+            None => self.fail(DecodeFault::Truncated { needed: count, left: self.left() }),
+        }
+    }
+
+    #[inline]
+    pub(super) fn u16(&mut self) -> Decoded<u16> {
+        self.array().map(u16::from_be_bytes)
+    }
+
+    #[inline]
+    pub(super) fn u32(&mut self) -> Decoded<u32> {
+        self.array().map(u32::from_be_bytes)
+    }
+
+    /// A byte that is 0 or 1; `fault` says what any other one is.
+    #[inline]
+    pub(super) fn flag(&mut self, fault: fn(u8) -> DecodeFault) -> Decoded<bool> {
+        match self.array()? {
+            [0] => Ok(false),
+            [1] => Ok(true),
+            [other] => self.fail_back(1, fault(other)),
+        }
+    }
+
+    /// A field of an object; an error names it.
+    #[inline(always)]
+    pub fn field<T: Value>(&mut self, name: &'static str, value: &mut T) -> Decoded<()> {
+        match value.decode(self) {
+            Ok(()) => Ok(()),
+            Err(error) => Err(error.in_field(name)),
+        }
+    }
+
+    /// Accounts for `bytes` to be allocated.
+    #[inline]
+    pub(super) fn allocate(&mut self, bytes: usize) -> Decoded<()> {
+        match self.memory.checked_sub(bytes) {
+            Some(memory) => {
+                self.memory = memory;
+                Ok(())
+            }
+            None => self.fail(DecodeFault::Memory),
+        }
+    }
+
+    /// Checks that `count` elements of at least `size_min` bytes can follow.
+    #[inline]
+    pub(super) fn bound(&self, count: usize, size_min: usize) -> Decoded<()> {
+        match count.checked_mul(size_min) {
+            Some(needed) if needed <= self.left() => Ok(()),
+            _ => self.fail(DecodeFault::Count { count, left: self.left() }),
+        }
+    }
+
+    /// Reads what is inside an object.
+    #[inline]
+    pub(super) fn nested(&mut self, read: impl FnOnce(&mut Self) -> Decoded<()>) -> Decoded<()> {
+        if self.depth == DEPTH_MAX {
+            return self.fail(DecodeFault::Depth);
+        }
+        self.depth += 1;
+        read(self)?;
+        self.depth -= 1;
+        Ok(())
+    }
+
+    /// What tells an object's type: none for a null.
+    #[inline]
+    pub(super) fn header(&mut self) -> Decoded<Option<Header>> {
+        if !self.flag(DecodeFault::Presence)? {
+            return Ok(None);
+        }
+        let series = SeriesName(u64::from_be_bytes(self.array()?));
+        Ok(Some(Header { series, type_id: self.u32()?, version: self.u16()? }))
+    }
+}
+
+/// Bytes from an object's presence byte to its first field.
+pub(super) const HEADER: usize = 15;
+
+/// The series, number and version of an object's type.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Header {
+    /// The series that the type belongs to.
+    pub series: SeriesName,
+    /// The number of the type in its series.
+    pub type_id: u32,
+    /// The version of the series.
+    pub version: u16,
+}
