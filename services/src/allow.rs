@@ -17,7 +17,8 @@ pub struct AllowRule {
 const READING: [&str; 4] = [aldis::PING, aldis::NODE_QUERY, aldis::HEALTH_QUERY, aldis::LOG_QUERY];
 
 /// Requests that change how the node works begin so: only the own entities and the operators may send them.
-const ADMINISTRATION: [&str; 3] = ["aldis.", "UMAA::SO::ResourceAllocation::ResourceAllocationPriority", "queue"];
+const ADMINISTRATION: [&str; 3] =
+    ["aldis.", "UMAA::SO::ResourceAllocation::ResourceAllocationPriority", "queue"];
 
 /// Decides about requests.
 #[derive(Debug, Clone, Default)]
@@ -41,7 +42,8 @@ impl Allow {
         if READING.contains(&request) || self.trusted.contains(&from) || self.allows(from, service, request) {
             return Ok(());
         }
-        let whom = if administers { "administers the node" } else { "is not in the list of reading requests" };
+        let whom =
+            if administers { "administers the node" } else { "is not in the list of reading requests" };
         Err(format!(
             "`{request}` {whom}, and entity {from} is neither an own entity nor an operator of this node; \
              an [[allow]] rule for service {service} can permit it"
@@ -81,7 +83,11 @@ mod tests {
             (7, 101, "plan.Route", false),
             (8, 100, "plan.Route", false),
         ] {
-            assert_eq!(allow.check(id(from), sid(service), request).is_ok(), allowed, "{from} {service} {request}");
+            assert_eq!(
+                allow.check(id(from), sid(service), request).is_ok(),
+                allowed,
+                "{from} {service} {request}"
+            );
         }
         assert!(allow.check(id(5), sid(1), "aldis.Kill").unwrap_err().contains("administers the node"));
     }

@@ -183,7 +183,11 @@ impl Bridge {
 
     /// When a waiting peer is to be given up, if nothing changes.
     pub(crate) fn next_deadline(&self) -> Option<Monotonic> {
-        self.peers.values().filter_map(|peer| peer.waiting_since).min().map(|since| since + self.spec.stall_timeout)
+        self.peers
+            .values()
+            .filter_map(|peer| peer.waiting_since)
+            .min()
+            .map(|since| since + self.spec.stall_timeout)
     }
 
     /// Gives up peers that took nothing for too long: what waits for them is shed. Returns their names and how much.

@@ -16,7 +16,11 @@ pub struct Alive {
 impl Alive {
     /// A token appeared or vanished.
     pub fn set(&mut self, source: Source, alive: bool) {
-        if alive { self.services.insert(source) } else { self.services.remove(&source) };
+        if alive {
+            self.services.insert(source)
+        } else {
+            self.services.remove(&source)
+        };
     }
 
     /// The tokens of the session's start are all told, or the session is gone and they are forgotten.
@@ -44,7 +48,9 @@ impl Alive {
             && match address {
                 Address::Name(_) => false,
                 Address::Service(to) => !self.services.contains(to),
-                Address::EntityServices(entity) | Address::Entity(entity) => self.of_entity(*entity).next().is_none(),
+                Address::EntityServices(entity) | Address::Entity(entity) => {
+                    self.of_entity(*entity).next().is_none()
+                }
             }
     }
 }
@@ -91,7 +97,8 @@ impl Calls {
         }
         let expected = expected(to, alive);
         self.deadlines.insert((deadline, caller, id));
-        self.open.insert((caller, id), Open { to: to.clone(), deadline, answers: 0, expected, refused: None });
+        self.open
+            .insert((caller, id), Open { to: to.clone(), deadline, answers: 0, expected, refused: None });
         Ok(())
     }
 

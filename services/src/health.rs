@@ -3,8 +3,8 @@
 use crate::service::{Component, ComponentHealth, Condition, Input, Level, Outbox, Service};
 use aldis_envelope::umaa::{self, ErrorCode, ErrorCondition, HealthReport, LongDescription, Topic};
 use aldis_envelope::{
-    Change, ContentType, EntityId, Envelope, Guid, Guids, KeyHash, Label, Monotonic, Name, Now, Prefix, ServiceId, Source,
-    aldis,
+    Change, ContentType, EntityId, Envelope, Guid, Guids, KeyHash, Label, Monotonic, Name, Now, Prefix,
+    ServiceId, Source, aldis,
 };
 use bytes::Bytes;
 use std::collections::BTreeMap;
@@ -38,8 +38,12 @@ impl Health {
     fn component(&mut self, now: Now, health: &ComponentHealth, out: &mut Outbox) {
         let (resource_id, code) = match &health.component {
             Component::Service(source) => (self.guids.of_service(*source), ErrorCode::Software),
-            Component::Resource("disk") => (self.guids.of_resource(self.source.entity, "disk"), ErrorCode::Filesys),
-            Component::Resource(name) => (self.guids.of_resource(self.source.entity, name), ErrorCode::Software),
+            Component::Resource("disk") => {
+                (self.guids.of_resource(self.source.entity, "disk"), ErrorCode::Filesys)
+            }
+            Component::Resource(name) => {
+                (self.guids.of_resource(self.source.entity, name), ErrorCode::Software)
+            }
         };
         let (severity, code) = match health.condition {
             Condition::Well => (ErrorCondition::None, ErrorCode::None),
@@ -98,7 +102,10 @@ impl Health {
                 format!("{RESOURCES_MAX} resources are held: the health of {} is not", report.resource_id),
             ),
             Err(why) => {
-                out.note(Level::Warning, format!("health report of {} unread: {why}", envelope.message.label.source()));
+                out.note(
+                    Level::Warning,
+                    format!("health report of {} unread: {why}", envelope.message.label.source()),
+                );
             }
         }
     }

@@ -115,10 +115,7 @@ impl Hosted {
     /// Every prefix that it receives: its own, its entity's and what it subscribed to.
     pub(crate) fn prefixes(&self) -> impl Iterator<Item = Prefix> + '_ {
         let source = self.spec.source;
-        let own = [
-            Prefix::Id(Address::Service(source)),
-            Prefix::Id(Address::EntityServices(source.entity)),
-        ];
+        let own = [Prefix::Id(Address::Service(source)), Prefix::Id(Address::EntityServices(source.entity))];
         own.into_iter().chain(self.prefixes.iter().cloned())
     }
 

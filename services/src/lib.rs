@@ -19,6 +19,7 @@ pub mod registry;
 pub mod service;
 pub mod sim;
 pub mod streams;
+pub mod track;
 
 pub use bridge::BridgeSpec;
 pub use event::{BridgeEvent, BridgeId, Effect, Event, PeerEvent, PeerId, PublisherId};

@@ -3,7 +3,8 @@
 use crate::service::{Input, Level, Note, Outbox, Service};
 use aldis_envelope::umaa::{self, LogLevel, LogReport, LongDescription, Topic};
 use aldis_envelope::{
-    Change, ContentType, EntityId, Envelope, Guids, Label, Name, Now, Prefix, Refusal, ServiceId, Source, aldis,
+    Change, ContentType, EntityId, Envelope, Guids, Label, Name, Now, Prefix, Refusal, ServiceId, Source,
+    aldis,
 };
 use std::collections::VecDeque;
 use std::sync::Arc;

@@ -16,7 +16,8 @@ use crate::notes::Notes;
 use crate::service::{Component, ComponentHealth, Condition, Level, ServiceSpec};
 use crate::streams::{Inbound, Outbound};
 use aldis_envelope::{
-    Address, BootId, EntityId, Fleet, KeyHash, Keys, Label, Message, Monotonic, Now, Prefix, Priority, ServiceId, Space,
+    Address, BootId, EntityId, Fleet, KeyHash, Keys, Label, Message, Monotonic, Now, Prefix, Priority,
+    ServiceId, Space,
 };
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -74,7 +75,7 @@ pub struct Node {
     /// Requests that wait until the tokens are told: before that, nobody knows where they can go.
     waiting_calls: Vec<(usize, Message)>,
     /// Services with wishes in their outboxes.
-    awake: Vec<usize>,
+    awake: VecDeque<usize>,
     /// Who receives what has changed: the labels are to be judged anew before the next message.
     labels_are_stale: bool,
     subscriptions: Vec<String>,
@@ -119,7 +120,7 @@ impl Node {
             notes: Notes::default(),
             work: VecDeque::new(),
             waiting_calls: Vec::new(),
-            awake: Vec::new(),
+            awake: VecDeque::new(),
             labels_are_stale: false,
             subscriptions: Vec::new(),
             bus_is_open: false,
@@ -221,7 +222,8 @@ impl Node {
 
     /// The ids of everything that is alive here.
     fn sources_running(&self) -> impl Iterator<Item = aldis_envelope::Source> + '_ {
-        let services = self.services.iter().filter(|hosted| hosted.is_running()).map(|hosted| hosted.spec.source);
+        let services =
+            self.services.iter().filter(|hosted| hosted.is_running()).map(|hosted| hosted.spec.source);
         services.chain(self.bridges.iter().map(|bridge| bridge.spec.source))
     }
 

@@ -3,7 +3,7 @@
 use crate::health::Health;
 use crate::log::Log;
 use crate::service::{Input, Outbox, Service, ServiceSpec};
-use crate::sim::vehicle::{Track, TrackConfig};
+use crate::track::{Track, TrackConfig};
 use aldis_envelope::{EntityId, Guids, Now, ServiceId, Source};
 use std::sync::Arc;
 use std::time::Duration;
@@ -36,12 +36,17 @@ impl Service for NodeService {
     }
 }
 
-/// The services that every node has.
+/// The services that every node has. Health and log start first, so that they hear of the others.
 pub fn built_in(entity: EntityId, guids: &Guids, health_period: Duration) -> Vec<ServiceSpec> {
     vec![
-        service(Source::new(entity, ServiceId::NODE), "node", Kind::Node, guids),
+        service(
+            Source::new(entity, ServiceId::HEALTH),
+            "health",
+            Kind::Health { period: health_period },
+            guids,
+        ),
         service(Source::new(entity, ServiceId::LOG), "log", Kind::Log, guids),
-        service(Source::new(entity, ServiceId::HEALTH), "health", Kind::Health { period: health_period }, guids),
+        service(Source::new(entity, ServiceId::NODE), "node", Kind::Node, guids),
     ]
 }
 

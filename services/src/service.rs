@@ -2,8 +2,8 @@
 
 mod outbox;
 
-pub use outbox::{Action, Outbox};
 pub(crate) use outbox::refusal;
+pub use outbox::{Action, Outbox};
 
 use aldis_envelope::{CallId, Envelope, Monotonic, Now, Prefix, Refusal, Source};
 use std::any::Any;

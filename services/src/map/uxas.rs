@@ -126,7 +126,10 @@ mod tests {
             assert_eq!(read.message.label.source().to_string(), "eid100sid61");
             assert_eq!((&read.message.content[..], read.assigned), (&b"x$y"[..], false));
             let read = importer.read(Bytes::from_static(b"a.B$lmcp|a.B||0|0$x")).unwrap();
-            assert_eq!((read.message.label.source().to_string().as_str(), read.assigned), ("eid400sid20", true));
+            assert_eq!(
+                (read.message.label.source().to_string().as_str(), read.assigned),
+                ("eid400sid20", true)
+            );
         }
     }
 

@@ -40,7 +40,13 @@ impl Node {
     }
 
     /// Answers a request in the name of a service.
-    pub(super) fn reply_as_host(&mut self, service: usize, request: &Envelope, descriptor: &str, content: Bytes) {
+    pub(super) fn reply_as_host(
+        &mut self,
+        service: usize,
+        request: &Envelope,
+        descriptor: &str,
+        content: Bytes,
+    ) {
         let (Some(call), Ok(name)) = (&request.message.call, Name::new(descriptor)) else { return };
         let to = Address::Service(request.message.label.source());
         let from = self.services[service].spec.source;

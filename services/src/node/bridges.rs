@@ -40,7 +40,8 @@ impl Node {
             PeerEvent::Message(message) => self.import(now, id, peer, message, effects),
             PeerEvent::Ready(bytes) => {
                 let ready = bridge.ready(now.monotonic, peer, bytes);
-                effects.extend(ready.into_iter().map(|(label, content)| Effect::Send(id, peer, label, content)));
+                effects
+                    .extend(ready.into_iter().map(|(label, content)| Effect::Send(id, peer, label, content)));
             }
             PeerEvent::Bad(error) => self.bad_frame(now, id, peer, error, effects),
             PeerEvent::Up(name, credit) => {
@@ -70,7 +71,14 @@ impl Node {
         }
     }
 
-    fn bad_frame(&mut self, now: Now, id: BridgeId, peer: PeerId, error: StreamError, effects: &mut Vec<Effect>) {
+    fn bad_frame(
+        &mut self,
+        now: Now,
+        id: BridgeId,
+        peer: PeerId,
+        error: StreamError,
+        effects: &mut Vec<Effect>,
+    ) {
         let bridge = &mut self.bridges[id.0];
         match error {
             StreamError::Skipped(bytes) => bridge.counters.bytes_skipped += bytes as u64,
@@ -78,14 +86,21 @@ impl Node {
         }
         let from = bridge.peer_name(peer).to_owned();
         let name = bridge.spec.name.clone();
-        self.say(now, Level::Warning, &format!("{name} bad stream"), format!("{name}: {from}: {error}"), effects);
+        self.say(
+            now,
+            Level::Warning,
+            &format!("{name} bad stream"),
+            format!("{name}: {from}: {error}"),
+            effects,
+        );
     }
 
     pub(super) fn give_up_stalled_peers(&mut self, now: Now, effects: &mut Vec<Effect>) {
         for i in 0..self.bridges.len() {
             for (peer, shed) in self.bridges[i].give_up_stalled(now.monotonic) {
                 let BridgeIdentity { name, limit } = self.identity(i);
-                let text = format!("{name}: {peer} takes nothing for {limit:?}: {shed} waiting messages dropped");
+                let text =
+                    format!("{name}: {peer} takes nothing for {limit:?}: {shed} waiting messages dropped");
                 self.say(now, Level::Warning, &format!("{name} stalled"), text, effects);
             }
         }

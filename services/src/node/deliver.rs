@@ -5,12 +5,13 @@ use crate::event::{BridgeId, Effect, PeerId, PublisherId};
 use crate::labels::Entry;
 use crate::service::{Input, Level, refusal};
 use aldis_envelope::{
-    Address, Call, Change, Envelope, KeyHash, Label, Message, Now, Priority, Refusal, Role, ServiceId, Space, Stamp, aldis,
+    Address, Call, Change, Envelope, KeyHash, Label, Message, Now, Priority, Refusal, Role, ServiceId, Space,
+    Stamp, aldis,
 };
 use std::sync::Arc;
 
 /// How many publishers are declared at the most: Zenoh keeps a route for each. Rarer keys are put on undeclared.
-pub const PUBLISHERS_MAX: usize = 2_000;
+pub(super) const PUBLISHERS_MAX: usize = 2_000;
 
 impl Node {
     /// A message that starts here: it is stamped, and goes everywhere.
@@ -86,7 +87,14 @@ impl Node {
     }
 
     /// Hands an envelope to the services and the bridges here that receive it.
-    fn deliver_here(&mut self, now: Now, origin: Origin, place: usize, envelope: &Envelope, effects: &mut Vec<Effect>) {
+    fn deliver_here(
+        &mut self,
+        now: Now,
+        origin: Origin,
+        place: usize,
+        envelope: &Envelope,
+        effects: &mut Vec<Effect>,
+    ) {
         let source = envelope.message.label.source();
         for i in 0..self.labels.entry(place).services.len() {
             let service = self.labels.entry(place).services[i];
@@ -137,7 +145,14 @@ impl Node {
     }
 
     /// An answer goes to the one who called, if it still waits.
-    fn answer(&mut self, now: Now, service: usize, envelope: &Envelope, call: &Call, effects: &mut Vec<Effect>) {
+    fn answer(
+        &mut self,
+        now: Now,
+        service: usize,
+        envelope: &Envelope,
+        call: &Call,
+        effects: &mut Vec<Effect>,
+    ) {
         let caller = self.services[service].spec.source;
         if envelope.message.label.address != Address::Service(caller) {
             return;
@@ -156,7 +171,14 @@ impl Node {
         }
     }
 
-    fn export(&mut self, now: Now, origin: Origin, bridge: BridgeId, envelope: &Envelope, effects: &mut Vec<Effect>) {
+    fn export(
+        &mut self,
+        now: Now,
+        origin: Origin,
+        bridge: BridgeId,
+        envelope: &Envelope,
+        effects: &mut Vec<Effect>,
+    ) {
         let message = &envelope.message;
         if message.change != Change::Put {
             return;
@@ -183,7 +205,8 @@ impl Node {
             Sent::Later => {}
             Sent::Shed => {
                 let name = &self.bridges[bridge.0].spec.name;
-                let text = format!("{name}: messages for {} are dropped", self.bridges[bridge.0].peer_name(peer));
+                let text =
+                    format!("{name}: messages for {} are dropped", self.bridges[bridge.0].peer_name(peer));
                 self.say(now, Level::Warning, &text.clone(), text, effects);
             }
         }
@@ -198,7 +221,8 @@ impl Node {
         let hash = instance.as_ref().map(|instance| instance.hash);
         // A limitedcast's instance chunk needs the serialized key, which a publisher does not keep.
         let plain = hash.is_none() || label.is_broadcast();
-        let publisher = if plain && !on_a_writer_key { self.publisher(place, &label, hash, effects) } else { None };
+        let publisher =
+            if plain && !on_a_writer_key { self.publisher(place, &label, hash, effects) } else { None };
         match publisher {
             Some(publisher) => effects.push(Effect::Publish(publisher, envelope)),
             None => {
@@ -262,9 +286,11 @@ impl Node {
             return place;
         }
         let address = &label.address;
-        let matches = |prefixes: &[aldis_envelope::Prefix]| prefixes.iter().any(|prefix| prefix.matches(address));
+        let matches =
+            |prefixes: &[aldis_envelope::Prefix]| prefixes.iter().any(|prefix| prefix.matches(address));
         let services = (0..self.services.len()).filter(|&i| self.services[i].receives(address)).collect();
-        let bridges = (0..self.bridges.len()).filter(|&i| self.bridges[i].exports(label)).map(BridgeId).collect();
+        let bridges =
+            (0..self.bridges.len()).filter(|&i| self.bridges[i].exports(label)).map(BridgeId).collect();
         self.labels.insert(Entry {
             label: label.clone(),
             services,

@@ -3,9 +3,7 @@
 use super::{Node, Origin, WORK_MAX};
 use crate::event::Effect;
 use crate::host::Ran;
-use crate::service::{
-    Action, Component, ComponentHealth, Condition, Input, JobOutput, Level, Note,
-};
+use crate::service::{Action, Component, ComponentHealth, Condition, Input, JobOutput, Level, Note};
 use aldis_envelope::{Address, CallId, Message, Now, Refusal, ServiceId, Source};
 use std::time::Duration;
 
@@ -14,7 +12,7 @@ impl Node {
         let ran = self.services[place].start(now);
         let source = self.services[place].spec.source;
         let running = self.services[place].is_running();
-        self.awake.push(place);
+        self.awake.push_back(place);
         if running && self.bus_is_open {
             effects.push(Effect::Token(source, true));
         }
@@ -29,8 +27,8 @@ impl Node {
     /// Gives a service an input and looks after what comes of it.
     pub(super) fn run(&mut self, now: Now, place: usize, input: Input<'_>, effects: &mut Vec<Effect>) {
         let ran = self.services[place].run(now, input);
-        if self.awake.last() != Some(&place) {
-            self.awake.push(place);
+        if self.awake.back() != Some(&place) {
+            self.awake.push_back(place);
         }
         if ran != Ran::Well {
             self.after(now, place, ran, effects);
@@ -50,7 +48,7 @@ impl Node {
     /// Does what services want until none wants anything more.
     pub(super) fn settle(&mut self, now: Now, effects: &mut Vec<Effect>) {
         loop {
-            while let Some(place) = self.awake.pop() {
+            while let Some(place) = self.awake.pop_front() {
                 self.take_actions(now, place, effects);
             }
             let Some((origin, message)) = self.work.pop_front() else { return };
@@ -94,14 +92,22 @@ impl Node {
             self.say(now, Level::Error, "refused source", text, effects);
         } else if self.work.len() >= WORK_MAX {
             self.counters.shed_inside += 1;
-            let text = format!("more than {WORK_MAX} messages wait inside the node: those of {source} are dropped");
+            let text =
+                format!("more than {WORK_MAX} messages wait inside the node: those of {source} are dropped");
             self.say(now, Level::Error, "shed inside", text, effects);
         } else {
             self.work.push_back((Origin::Service(place), message));
         }
     }
 
-    fn open_call(&mut self, now: Now, place: usize, message: Message, within: Duration, effects: &mut Vec<Effect>) {
+    fn open_call(
+        &mut self,
+        now: Now,
+        place: usize,
+        message: Message,
+        within: Duration,
+        effects: &mut Vec<Effect>,
+    ) {
         let Some(id) = message.call.as_ref().map(|call| call.id) else { return };
         let (source, to) = (message.label.source(), message.label.address.clone());
         let here = matches!(&to, Address::Service(s) if self.is_alive_here(*s));
@@ -188,7 +194,7 @@ impl Node {
         if let Some(place) = self.service_at(ServiceId::HEALTH) {
             let ran = self.services[place].run(now, Input::Component(health));
             self.counters.crashes += u64::from(ran != Ran::Well);
-            self.awake.push(place);
+            self.awake.push_back(place);
         }
     }
 
@@ -196,7 +202,7 @@ impl Node {
         if let Some(place) = self.service_at(ServiceId::LOG) {
             let ran = self.services[place].run(now, Input::Note(&note));
             self.counters.crashes += u64::from(ran != Ran::Well);
-            self.awake.push(place);
+            self.awake.push_back(place);
         }
         effects.push(Effect::Say(note));
     }

@@ -64,7 +64,14 @@ impl Outbox {
     }
 
     /// Answers a request; does nothing where the message is none. `last` says that no more answers follow from here.
-    pub fn reply(&mut self, request: &Envelope, content_type: ContentType, descriptor: Name, content: Bytes, last: bool) {
+    pub fn reply(
+        &mut self,
+        request: &Envelope,
+        content_type: ContentType,
+        descriptor: Name,
+        content: Bytes,
+        last: bool,
+    ) {
         if let Some(id) = request_id(request) {
             let to = Address::Service(request.message.label.source());
             let label = Label::limitedcast(to, content_type, descriptor.into(), self.source);

@@ -1,0 +1,7 @@
+//! The simulator: whole fleets of real nodes over a simulated bus, in virtual time, from a seed.
+
+mod network;
+mod world;
+
+pub use network::meets;
+pub use world::{NodeHandle, World};
