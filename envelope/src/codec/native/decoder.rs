@@ -26,6 +26,7 @@ pub struct Decoder {
     known: BTreeMap<Arc<str>, Arc<Known>>,
     labels: BTreeSet<Arc<Label>>,
     last: Option<(Arc<str>, Arc<Known>)>,
+    learned: bool,
 }
 
 /// What the constant part of a header said on a key.
@@ -43,7 +44,7 @@ struct Known {
 impl Decoder {
     /// A decoder of one fleet's keys.
     pub fn new(keys: Keys) -> Self {
-        Self { keys, known: BTreeMap::new(), labels: BTreeSet::new(), last: None }
+        Self { keys, known: BTreeMap::new(), labels: BTreeSet::new(), last: None, learned: false }
     }
 
     /// Reads an envelope from a sample; `deleted` says that the sample is a Zenoh DELETE.
@@ -68,6 +69,11 @@ impl Decoder {
             }
             left => Err(HeaderError::Trailing(left)),
         }
+    }
+
+    /// Whether a key was met for the first time since this was last asked.
+    pub fn take_learned(&mut self) -> bool {
+        std::mem::take(&mut self.learned)
     }
 
     fn known(&mut self, key: &str, header: &[u8]) -> Result<Arc<Known>, HeaderError> {
@@ -105,7 +111,7 @@ impl Decoder {
             }
         };
         let (key, known): (Arc<str>, _) = (key.into(), Arc::new(known));
-        self.known.insert(key.clone(), known.clone());
+        self.learned |= self.known.insert(key.clone(), known.clone()).is_none();
         Ok((key, known))
     }
 }

@@ -1,0 +1,8 @@
+//! The bus: the only place that knows Zenoh.
+
+mod inbox;
+mod session;
+
+pub(crate) use inbox::Inbox;
+pub(crate) use session::{Bus, BusError};
+pub(crate) use zenoh::qos::CongestionControl as Congestion;

@@ -1,0 +1,273 @@
+//! One session on the bus, and all that is declared on it.
+
+use super::Inbox;
+use aldis_envelope::codec::native::{encode, encode_variable};
+use aldis_envelope::{Change, Envelope, Keys, Priority, Source};
+use aldis_services::{Event, PublisherId};
+use bytes::Bytes;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+use zenoh::bytes::ZBytes;
+use zenoh::key_expr::KeyExpr;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::{Publisher, Subscriber};
+use zenoh::qos::CongestionControl;
+use zenoh::sample::{Locality, Sample, SampleKind};
+use zenoh::{Session, Wait};
+
+/// How many keys of others are declared: with them Zenoh keeps a route for each. Ten thousand at once block for seconds.
+const KEYS_DECLARED_MAX: usize = 2_000;
+
+/// How long closing the session may take.
+const CLOSE_WITHIN: Duration = Duration::from_secs(2);
+
+/// Contents up to this size are copied out of Zenoh's buffers, so that a small message does not keep a large one's
+/// buffer; larger ones are shared.
+const COPY_UP_TO: usize = 2_048;
+
+/// Zenoh's word for what went wrong.
+#[derive(Debug, thiserror::Error)]
+#[error("{doing}: {why}")]
+pub(crate) struct BusError {
+    doing: &'static str,
+    why: String,
+}
+
+fn failed<E: std::fmt::Display>(doing: &'static str) -> impl Fn(E) -> BusError {
+    move |why| BusError { doing, why: why.to_string() }
+}
+
+struct Declared {
+    publisher: Publisher<'static>,
+    constant: Vec<u8>,
+}
+
+/// A session on the bus.
+pub(crate) struct Bus {
+    session: Session,
+    keys: Keys,
+    inbox: Arc<Inbox>,
+    congestion: CongestionControl,
+    publishers: Vec<Option<Declared>>,
+    subscribers: BTreeMap<String, Subscriber<()>>,
+    tokens: BTreeMap<Source, LivelinessToken>,
+    learned: Vec<KeyExpr<'static>>,
+    _alive: Option<Subscriber<()>>,
+}
+
+impl Bus {
+    /// Opens a session. What comes in goes to the inbox.
+    pub(crate) async fn open(
+        config: zenoh::Config,
+        keys: Keys,
+        congestion: CongestionControl,
+        inbox: Arc<Inbox>,
+    ) -> Result<Self, BusError> {
+        let session = zenoh::open(config).await.map_err(failed("open the session"))?;
+        Ok(Self {
+            session,
+            keys,
+            inbox,
+            congestion,
+            publishers: Vec::new(),
+            subscribers: BTreeMap::new(),
+            tokens: BTreeMap::new(),
+            learned: Vec::new(),
+            _alive: None,
+        })
+    }
+
+    /// Follows the liveliness tokens of the fleet, and says when those that are there now are all told.
+    pub(crate) fn follow_tokens(&mut self) -> Result<(), BusError> {
+        let doing = "follow the liveliness tokens";
+        let tell = |inbox: &Inbox, keys: &Keys, sample: &Sample| {
+            if let Ok(parsed) = keys.parse(sample.key_expr().as_str()) {
+                inbox.event(Event::Alive(parsed.source, sample.kind() == SampleKind::Put));
+            }
+        };
+        let (inbox, keys) = (self.inbox.clone(), self.keys.clone());
+        let liveliness = self.session.liveliness();
+        let subscriber = liveliness
+            .declare_subscriber(self.keys.every_alive())
+            .callback(move |sample| tell(&inbox, &keys, &sample))
+            .wait()
+            .map_err(failed(doing))?;
+        let (keys, told) = (self.keys.clone(), Told(self.inbox.clone()));
+        liveliness
+            .get(self.keys.every_alive())
+            .timeout(Duration::from_secs(3))
+            .callback(move |reply| {
+                if let Ok(sample) = reply.result() {
+                    tell(&told.0, &keys, sample);
+                }
+            })
+            .wait()
+            .map_err(failed(doing))?;
+        self._alive = Some(subscriber);
+        Ok(())
+    }
+
+    /// Subscribes to these key expressions and to no others. New ones are declared before old ones go, so that nothing
+    /// is missed; what is received twice meanwhile is a duplicate in its stream and dropped.
+    pub(crate) fn subscribe(&mut self, expressions: Vec<String>) -> Result<(), BusError> {
+        for expression in &expressions {
+            if self.subscribers.contains_key(expression) {
+                continue;
+            }
+            let inbox = self.inbox.clone();
+            let subscriber = self
+                .session
+                .declare_subscriber(expression.clone())
+                .allowed_origin(Locality::Remote)
+                .callback(move |sample| take(&inbox, &sample))
+                .wait()
+                .map_err(failed("subscribe"))?;
+            self.subscribers.insert(expression.clone(), subscriber);
+        }
+        self.subscribers.retain(|expression, _| expressions.contains(expression));
+        Ok(())
+    }
+
+    /// Prepares a publisher.
+    pub(crate) fn declare(
+        &mut self,
+        id: PublisherId,
+        key: String,
+        constant: Vec<u8>,
+        priority: Priority,
+    ) -> Result<(), BusError> {
+        let publisher = self
+            .session
+            .declare_publisher(key)
+            .congestion_control(self.congestion)
+            .priority(zenoh_priority(priority))
+            .allowed_destination(Locality::Remote)
+            .wait()
+            .map_err(failed("declare a publisher"))?;
+        if self.publishers.len() <= id.0 {
+            self.publishers.resize_with(id.0 + 1, || None);
+        }
+        self.publishers[id.0] = Some(Declared { publisher, constant });
+        Ok(())
+    }
+
+    /// Puts an envelope with a prepared publisher.
+    pub(crate) fn publish(&self, id: PublisherId, envelope: Envelope) -> Result<(), BusError> {
+        let Some(Some(declared)) = self.publishers.get(id.0) else {
+            return Err(failed("publish")("the publisher was not declared"));
+        };
+        let mut header = Vec::with_capacity(declared.constant.len() + 48);
+        header.extend_from_slice(&declared.constant);
+        encode_variable(&envelope.message, &envelope.stamp, &mut header);
+        let put = match envelope.message.change {
+            Change::Dispose => declared.publisher.delete().attachment(header).wait(),
+            _ => declared.publisher.put(ZBytes::from(envelope.message.content)).attachment(header).wait(),
+        };
+        put.map_err(failed("publish"))
+    }
+
+    /// Puts an envelope on a key without a publisher.
+    pub(crate) fn publish_on(&self, key: String, envelope: Envelope) -> Result<(), BusError> {
+        let mut header = Vec::with_capacity(128);
+        encode(&envelope, &mut header);
+        let priority = zenoh_priority(envelope.stamp.priority);
+        let put = match envelope.message.change {
+            Change::Dispose => {
+                let delete = self.session.delete(key).congestion_control(self.congestion).priority(priority);
+                delete.allowed_destination(Locality::Remote).attachment(header).wait()
+            }
+            _ => {
+                let content = ZBytes::from(envelope.message.content);
+                let put = self.session.put(key, content).congestion_control(self.congestion).priority(priority);
+                put.allowed_destination(Locality::Remote).attachment(header).wait()
+            }
+        };
+        put.map_err(failed("publish"))
+    }
+
+    /// Shows or withdraws the token of a service.
+    pub(crate) fn token(&mut self, source: Source, shown: bool) -> Result<(), BusError> {
+        if !shown {
+            self.tokens.remove(&source);
+            return Ok(());
+        }
+        let key = self.keys.alive(source);
+        let token = self.session.liveliness().declare_token(key).wait().map_err(failed("show a token"))?;
+        self.tokens.insert(source, token);
+        Ok(())
+    }
+
+    /// Declares keys of others, seen for the first time: Zenoh caches routes for declared keys alone.
+    pub(crate) fn declare_learned(&mut self, keys: Vec<String>) {
+        for key in keys {
+            if self.learned.len() >= KEYS_DECLARED_MAX {
+                return;
+            }
+            if let Ok(declared) = self.session.declare_keyexpr(key).wait() {
+                self.learned.push(declared);
+            }
+        }
+    }
+
+    /// Whether the session is gone.
+    pub(crate) fn is_closed(&self) -> bool {
+        self.session.is_closed()
+    }
+
+    /// Closes the session, within a bound.
+    pub(crate) async fn close(self) {
+        let Self { session, publishers, subscribers, tokens, .. } = self;
+        drop((tokens, subscribers, publishers));
+        if tokio::time::timeout(CLOSE_WITHIN, session.close()).await.is_err() {
+            tracing::warn!("the session on the bus did not close within {CLOSE_WITHIN:?}");
+        }
+    }
+}
+
+/// Says that all tokens are told when Zenoh has dropped the query's callback, which it does after the last reply.
+struct Told(Arc<Inbox>);
+
+impl Drop for Told {
+    fn drop(&mut self) {
+        self.0.event(Event::AliveKnown);
+    }
+}
+
+fn take(inbox: &Inbox, sample: &Sample) {
+    let header = sample.attachment().map(ZBytes::to_bytes).unwrap_or_default();
+    let content = content_of(sample.payload());
+    inbox.sample(sample.key_expr().as_str(), sample.kind() == SampleKind::Delete, &header, content);
+}
+
+fn content_of(payload: &ZBytes) -> Bytes {
+    let mut slices = payload.slices();
+    match (slices.next(), slices.next()) {
+        (None, _) => Bytes::new(),
+        (Some(only), None) if only.len() > COPY_UP_TO => Bytes::from_owner(Whole(payload.clone())),
+        (Some(only), None) => Bytes::copy_from_slice(only),
+        _ => Bytes::from(payload.to_bytes().into_owned()),
+    }
+}
+
+/// A payload in one piece.
+struct Whole(ZBytes);
+
+impl AsRef<[u8]> for Whole {
+    fn as_ref(&self) -> &[u8] {
+        self.0.slices().next().unwrap_or_default()
+    }
+}
+
+fn zenoh_priority(priority: Priority) -> zenoh::qos::Priority {
+    use zenoh::qos::Priority as Zenoh;
+    match priority {
+        Priority::RealTime => Zenoh::RealTime,
+        Priority::InteractiveHigh => Zenoh::InteractiveHigh,
+        Priority::InteractiveLow => Zenoh::InteractiveLow,
+        Priority::DataHigh => Zenoh::DataHigh,
+        Priority::Data => Zenoh::Data,
+        Priority::DataLow => Zenoh::DataLow,
+        Priority::Background => Zenoh::Background,
+    }
+}

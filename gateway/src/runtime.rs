@@ -1,0 +1,142 @@
+//! Runs one node: clocks, bus, bridges and jobs around the pure object.
+
+mod bus_task;
+mod core;
+mod wiring;
+
+pub(crate) use core::{Core, Shared};
+pub(crate) use wiring::{Outside, node_config, outside};
+
+use crate::bridge::uxas_tcp;
+use aldis_services::event::BridgeId;
+use aldis_services::{Event, Node, NodeConfig};
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::sync::{mpsc, watch};
+use tokio::task::LocalSet;
+
+/// How long the orderly end of a node may take before it is cut off.
+const SHUTDOWN_WITHIN: Duration = Duration::from_secs(5);
+
+/// What can be asked of a running node from outside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Control {
+    /// End in order.
+    Shutdown,
+    /// Close the session on the bus and stay away (true), or come back.
+    Silence(bool),
+}
+
+/// Why a node could not be started.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum RuntimeError {
+    /// The configuration cannot be.
+    #[error("{0}")]
+    Config(String),
+    /// The machine gives no runtime.
+    #[error("no runtime: {0}")]
+    Runtime(#[from] std::io::Error),
+}
+
+/// Runs a node until it ends. Blocks this thread; nothing of it outlives the call.
+pub(crate) fn run(
+    config: NodeConfig,
+    outside: Outside,
+    control: mpsc::UnboundedReceiver<Control>,
+) -> Result<(), RuntimeError> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    let keys = aldis_envelope::Keys::new(&config.fleet);
+    let dialects = config.bridges.iter().map(|bridge| bridge.dialect).collect();
+    let node = Node::new(config).map_err(RuntimeError::Config)?;
+    let local = LocalSet::new();
+    let result = local.block_on(&runtime, async move {
+        let (core, ends) = Core::new(node, dialects, runtime_handle());
+        drive(core, ends, outside, keys, control).await;
+    });
+    runtime.shutdown_timeout(Duration::from_secs(1));
+    Ok(result)
+}
+
+fn runtime_handle() -> tokio::runtime::Handle {
+    tokio::runtime::Handle::current()
+}
+
+/// What the tasks around a core follow.
+pub(crate) struct Ends {
+    pub(crate) timer: watch::Receiver<Option<aldis_envelope::Monotonic>>,
+    pub(crate) paused: watch::Receiver<bool>,
+    pub(crate) exited: watch::Receiver<bool>,
+    pub(crate) jobs: mpsc::UnboundedReceiver<Event>,
+}
+
+async fn drive(
+    core: Shared,
+    ends: Ends,
+    outside: Outside,
+    keys: aldis_envelope::Keys,
+    control: mpsc::UnboundedReceiver<Control>,
+) {
+    let Ends { timer, paused, mut exited, jobs } = ends;
+    core.lock().handle(&mut Vec::new());
+    let (silence, silenced) = watch::channel(false);
+    let inbox = Arc::new(crate::bus::Inbox::new(keys.clone()));
+    let mut tasks = tokio::task::JoinSet::new();
+    tasks.spawn_local(deadlines(core.clone(), timer));
+    tasks.spawn_local(job_results(core.clone(), jobs));
+    tasks.spawn_local(bus_task::drain(core.clone(), inbox.clone(), paused.clone()));
+    for (i, endpoint) in outside.bridges.into_iter().enumerate() {
+        tasks.spawn_local(uxas_tcp::serve(core.clone(), BridgeId(i), endpoint, paused.clone()));
+    }
+    let (closed, mut is_closed) = watch::channel(false);
+    let bus = bus_task::keep(core.clone(), inbox, keys, outside.bus, silenced, closed);
+    tasks.spawn_local(bus);
+    tasks.spawn_local(controls(core.clone(), control, silence));
+    let _ = exited.wait_for(|exited| *exited).await;
+    let closed = tokio::time::timeout(SHUTDOWN_WITHIN, is_closed.wait_for(|closed| *closed)).await;
+    if closed.is_err() {
+        tracing::warn!("the bus did not close within {SHUTDOWN_WITHIN:?}");
+    }
+    tasks.shutdown().await;
+}
+
+async fn deadlines(core: Shared, mut timer: watch::Receiver<Option<aldis_envelope::Monotonic>>) {
+    loop {
+        let Some(at) = *timer.borrow_and_update() else {
+            if timer.changed().await.is_err() {
+                return;
+            }
+            continue;
+        };
+        let at = core.lock().clock().instant(at);
+        tokio::select! {
+            changed = timer.changed() => {
+                if changed.is_err() {
+                    return;
+                }
+            }
+            () = tokio::time::sleep_until(at.into()) => {
+                let mut core = core.lock();
+                core.disarm();
+                core.handle(&mut vec![Event::Deadline]);
+            }
+        }
+    }
+}
+
+async fn job_results(core: Shared, mut jobs: mpsc::UnboundedReceiver<Event>) {
+    while let Some(done) = jobs.recv().await {
+        core.lock().handle(&mut vec![done]);
+    }
+}
+
+async fn controls(core: Shared, mut control: mpsc::UnboundedReceiver<Control>, silence: watch::Sender<bool>) {
+    while let Some(asked) = control.recv().await {
+        match asked {
+            Control::Shutdown => core.lock().handle(&mut vec![Event::Shutdown]),
+            Control::Silence(silenced) => {
+                let _ = silence.send(silenced);
+            }
+        }
+    }
+    core.lock().handle(&mut vec![Event::Shutdown]);
+}

@@ -1,0 +1,115 @@
+//! Keeps a session on the bus, and hands what comes from it to the node.
+
+use super::Shared;
+use crate::bus::{Bus, BusError, Inbox};
+use aldis_envelope::Keys;
+use aldis_services::Event;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::sync::watch;
+use crate::bus::Congestion;
+
+/// The first wait before a session is opened again, doubled each time.
+const RETRY_MIN: Duration = Duration::from_millis(200);
+/// The longest wait.
+const RETRY_MAX: Duration = Duration::from_secs(10);
+/// How often a session is asked whether it still lives: it dies by itself only when Zenoh gives up.
+const CHECK_EVERY: Duration = Duration::from_secs(1);
+
+/// How a node joins the bus.
+pub(crate) struct Joining {
+    /// Zenoh's configuration.
+    pub(crate) config: zenoh::Config,
+    /// What a stream does when the bus does not take its messages.
+    pub(crate) congestion: Congestion,
+}
+
+/// Opens the session, again where it fails, closes it while silenced and at the end.
+pub(super) async fn keep(
+    core: Shared,
+    inbox: Arc<Inbox>,
+    keys: Keys,
+    joining: Joining,
+    mut silenced: watch::Receiver<bool>,
+    closed: watch::Sender<bool>,
+) {
+    let mut exited = core.lock().exited();
+    let mut wait = RETRY_MIN;
+    while !*exited.borrow() {
+        if silenced.wait_for(|silenced| !*silenced).await.is_err() {
+            break;
+        }
+        let opening = Bus::open(joining.config.clone(), keys.clone(), joining.congestion, inbox.clone());
+        let opened = tokio::select! {
+            opened = opening => opened,
+            _ = exited.wait_for(|exited| *exited) => break,
+        };
+        match opened.and_then(|bus| install(&core, bus)) {
+            Ok(()) => wait = RETRY_MIN,
+            Err(why) => {
+                core.lock().handle(&mut vec![Event::BusClosed(why.to_string())]);
+                tokio::select! {
+                    () = tokio::time::sleep(wait) => {}
+                    _ = exited.wait_for(|exited| *exited) => break,
+                }
+                wait = (wait * 2).min(RETRY_MAX);
+                continue;
+            }
+        }
+        tokio::select! {
+            _ = silenced.wait_for(|silenced| *silenced) => {
+                core.lock().handle(&mut vec![Event::BusClosed("silenced".into())]);
+            }
+            _ = exited.wait_for(|exited| *exited) => {}
+            () = until_closed(&core) => {}
+        }
+        let bus = core.lock().set_bus(None);
+        if let Some(bus) = bus {
+            bus.close().await;
+        }
+    }
+    closed.send_replace(true);
+}
+
+/// The node has a session. What it declares goes out before the tokens are asked for, so that answers find their way.
+fn install(core: &Shared, bus: Bus) -> Result<(), BusError> {
+    let mut core = core.lock();
+    core.set_bus(Some(bus));
+    core.handle(&mut vec![Event::BusOpened]);
+    match core.bus() {
+        Some(bus) => bus.follow_tokens(),
+        None => Ok(()),
+    }
+}
+
+async fn until_closed(core: &Shared) {
+    loop {
+        tokio::time::sleep(CHECK_EVERY).await;
+        let mut core = core.lock();
+        match core.bus() {
+            Some(bus) if bus.is_closed() => {
+                core.handle(&mut vec![Event::BusClosed("Zenoh closed the session".into())]);
+                return;
+            }
+            Some(_) => {}
+            None => return,
+        }
+    }
+}
+
+/// Hands what Zenoh's threads left in the inbox to the node, unless input is paused.
+pub(super) async fn drain(core: Shared, inbox: Arc<Inbox>, mut paused: watch::Receiver<bool>) {
+    let mut events = Vec::new();
+    loop {
+        inbox.filled().await;
+        if paused.wait_for(|paused| !*paused).await.is_err() {
+            return;
+        }
+        let learned = inbox.drain(&mut events);
+        let mut core = core.lock();
+        core.handle(&mut events);
+        if let Some(bus) = core.bus() {
+            bus.declare_learned(learned);
+        }
+    }
+}
