@@ -1,7 +1,8 @@
 //! The configuration of one node: a TOML file a machine, which shows the running system.
 //!
 //! `load` is the one road in: unknown keys are refused, every value is checked, and a mistake is told with file,
-//! line, column and cure. The same types give the JSON Schema (`schema`).
+//! line, column and cure. The same types give the JSON Schema (`schema`) and
+//! Zenoh's configuration (`bus::zenoh_config`).
 
 mod allow;
 mod bridge;

@@ -1,10 +1,13 @@
-//! How a node joins the bus: the `[bus]` table.
+//! How a node joins the bus: the `[bus]` table, and its translation for Zenoh.
+
+mod translate;
 
 use super::locator::Locator;
 use super::text::PlainName;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+pub(crate) use translate::{BusError, password, zenoh_config};
 
 /// The `[bus]` table. Files are looked for beside the configuration file, unless their path is absolute.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
