@@ -1,9 +1,10 @@
 //! The configuration of one node: a TOML file a machine, which shows the running system.
 //!
 //! `load` is the one road in: unknown keys are refused, every value is checked, and a mistake is told with file,
-//! line, column and cure. The same types give the JSON Schema (`schema`) and
+//! line, column and cure. The same types give the JSON Schema (`schema`), the router's access control (`acl`) and
 //! Zenoh's configuration (`bus::zenoh_config`).
 
+mod acl;
 mod allow;
 mod bridge;
 pub(crate) mod bus;
@@ -17,6 +18,7 @@ mod schema;
 mod service;
 mod text;
 
+pub(crate) use acl::{AclError, acl};
 pub(crate) use allow::{Allow, Called, Callers};
 pub(crate) use bridge::{Bridge, Endpoint, UxasTcp};
 pub(crate) use bus::Bus;
