@@ -68,12 +68,14 @@ impl Bus {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Mode {
-    /// Joined to every other directly.
+    /// Joined directly to those at `listen` and `connect`. It passes on what its clients send and hear, but nothing
+    /// from one peer to another: peers that shall hear each other are joined to each other, or use gossip.
     #[default]
     Peer,
-    /// Joined to one router or peer, which passes everything on.
+    /// Joined to one router or peer at `connect`, which passes everything on. Opening the bus fails while none of them
+    /// answers, and is to be tried again; a bus that was open comes back by itself.
     Client,
-    /// Passes messages on between others, and checks their rights.
+    /// Passes messages on between its clients, and checks their rights.
     Router,
 }
 

@@ -279,3 +279,24 @@ fn a_configuration_survives_being_written_and_read() {
     let json = serde_json::to_string(&config).unwrap();
     assert_eq!(serde_json::from_str::<Config>(&json).unwrap(), config);
 }
+
+#[test]
+fn every_example_loads() {
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(directory).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|extension| extension == "toml") {
+            names.push(Config::load(&path).unwrap_or_else(|e| panic!("\n{}", drawn(&e))));
+        }
+    }
+    assert!(names.len() >= 3);
+    assert!(acl(&names).is_ok());
+}
+
+#[test]
+fn files_are_looked_for_beside_the_configuration() {
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
+    let config = Config::load(&directory.join("router.toml")).unwrap();
+    assert_eq!(config.bus.dictionary_file, Some(directory.join("router-users.txt")));
+}
