@@ -1,0 +1,188 @@
+//! The configuration of one node: a TOML file a machine, which shows the running system.
+//!
+//! `load` is the one road in: unknown keys are refused, every value is checked, and a mistake is told with file,
+//! line, column and cure. The same types give the JSON Schema (`schema`), the router's access control (`acl`) and
+//! Zenoh's configuration (`bus::zenoh_config`).
+
+mod acl;
+mod allow;
+mod bridge;
+pub(crate) mod bus;
+mod check;
+mod cure;
+mod entities;
+mod error;
+mod locator;
+mod read;
+mod schema;
+mod service;
+mod text;
+
+pub(crate) use acl::{AclError, acl};
+pub(crate) use allow::{Allow, Called, Callers};
+pub(crate) use bridge::{Bridge, Endpoint, UxasTcp};
+pub(crate) use bus::Bus;
+pub(crate) use entities::{Entities, Operators};
+pub(crate) use error::ConfigError;
+pub(crate) use locator::Locator;
+pub(crate) use schema::schema;
+pub(crate) use service::{Service, Track};
+pub(crate) use text::{PlainName, RequestPrefix};
+
+use aldis_envelope::{Fleet, Prefix};
+use error::Fault;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::time::Duration;
+
+/// The configuration of one node.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Config {
+    /// The fleet that the node belongs to. Default: "fleet".
+    #[serde(default = "default_fleet")]
+    #[schemars(with = "schema::Fleet")]
+    pub(crate) fleet: Fleet,
+    /// The name of the node: in logs, as common name of its certificate, and as its user where `bus.user` names none.
+    pub(crate) name: PlainName,
+    /// The entities that the node speaks for, its own first. Messages of any other source are refused.
+    pub(crate) entities: Entities,
+    /// Entities that may administer the node, besides its own. Default: none.
+    #[serde(default)]
+    pub(crate) operators: Operators,
+    /// How the node joins the bus.
+    #[serde(default)]
+    pub(crate) bus: Bus,
+    /// What passes between the node and the bus.
+    #[serde(default)]
+    pub(crate) routing: Routing,
+    /// Where other worlds are joined.
+    #[serde(default, rename = "bridge")]
+    pub(crate) bridges: Vec<Bridge>,
+    /// Who may call what, beyond the defaults.
+    #[serde(default)]
+    pub(crate) allow: Vec<Allow>,
+    /// What the program writes about itself.
+    #[serde(default)]
+    pub(crate) log: Log,
+    /// The health reports of the node.
+    #[serde(default)]
+    pub(crate) health: Health,
+    /// Services that the node runs beyond the built-in ones.
+    #[serde(default, rename = "service")]
+    pub(crate) services: Vec<Service>,
+}
+
+impl Config {
+    /// Reads a configuration file. Relative paths in it are taken from its directory.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with the place and the cure of every mistake found.
+    pub(crate) fn load(path: &Path) -> Result<Self, ConfigError> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|e| ConfigError::unreadable(&file, &e))?;
+        let mut config = Self::parse(&file, &text)?;
+        config.bus.resolve(path.parent().unwrap_or(Path::new("")));
+        Ok(config)
+    }
+
+    /// Reads a configuration from its text; `file` is how mistakes name it.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with the place and the cure of every mistake found.
+    pub(crate) fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
+        read::read(file, text)
+    }
+}
+
+fn default_fleet() -> Fleet {
+    Fleet::new("fleet").expect("`fleet` is made of letters")
+}
+
+/// The `[routing]` table: what passes between the node and the bus. A message passes where one prefix fits; an empty
+/// list lets nothing through.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct Routing {
+    /// Addresses taken from the bus. Default: all.
+    #[schemars(with = "Vec<schema::Prefix>")]
+    pub(crate) import: Vec<Prefix>,
+    /// Addresses given to the bus. Default: all.
+    #[schemars(with = "Vec<schema::Prefix>")]
+    pub(crate) export: Vec<Prefix>,
+}
+
+impl Default for Routing {
+    fn default() -> Self {
+        Self { import: bridge::all(), export: bridge::all() }
+    }
+}
+
+/// The `[log]` table: what the program writes about itself, to standard error.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct Log {
+    /// The least important that is written. Default: info.
+    pub(crate) level: Level,
+    /// Lines for people or JSON for machines. Default: text.
+    pub(crate) format: LogFormat,
+}
+
+/// How important a line of the log is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Level {
+    /// Something does not work.
+    Error,
+    /// Something may soon not work, or was refused.
+    Warn,
+    /// What an operator wants to know.
+    #[default]
+    Info,
+    /// What an integrator wants to know.
+    Debug,
+    /// Everything.
+    Trace,
+}
+
+/// How the log is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum LogFormat {
+    /// Lines for people.
+    #[default]
+    Text,
+    /// One JSON object a line.
+    Json,
+}
+
+/// The `[health]` table.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct Health {
+    /// How often each health report is repeated, in milliseconds. Default: 5000; shorter finds silence sooner and
+    /// costs bandwidth on every link.
+    #[schemars(range(min = 100, max = 3_600_000))]
+    pub(crate) report_period_ms: u32,
+}
+
+impl Health {
+    /// How often each health report is repeated.
+    pub(crate) fn report_period(&self) -> Duration {
+        Duration::from_millis(u64::from(self.report_period_ms))
+    }
+
+    fn check(&self) -> Result<(), Fault> {
+        bridge::in_range("report_period_ms", self.report_period_ms, 100..=3_600_000, "milliseconds")
+    }
+}
+
+impl Default for Health {
+    fn default() -> Self {
+        Self { report_period_ms: 5000 }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,92 @@
+//! Services that a configuration adds to a node.
+
+use super::bridge::in_range;
+use super::error::Fault;
+use super::schema;
+use aldis_envelope::{EntityId, ServiceId};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The smallest service id that a configuration may give; those below are built in or bridges.
+pub(crate) const SERVICE_MIN: u32 = 100;
+
+/// One `[[service]]`, by its `kind`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub(crate) enum Service {
+    /// A simple moving vehicle that sends telemetry.
+    Track(Track),
+}
+
+impl Service {
+    /// What may stand as `kind`.
+    pub(crate) const KINDS: &[&str] = &["track"];
+
+    /// The service id, unique on its entity.
+    pub(crate) fn service(&self) -> ServiceId {
+        match self {
+            Self::Track(track) => track.service,
+        }
+    }
+
+    /// The entity that the service belongs to; none is the node's own.
+    pub(crate) fn entity(&self) -> Option<EntityId> {
+        match self {
+            Self::Track(track) => track.entity,
+        }
+    }
+}
+
+/// A vehicle that moves at constant speed and turn rate and tells where it is: a straight line or a circle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Track {
+    /// The service id, 100 or more, unique on its entity.
+    #[schemars(with = "schema::NamedServiceId")]
+    pub(crate) service: ServiceId,
+    /// The entity that moves, one of `entities`. Default: the node's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<schema::EntityId>")]
+    pub(crate) entity: Option<EntityId>,
+    /// Where it starts: latitude, WGS-84 degrees, north positive.
+    #[schemars(range(min = -90.0, max = 90.0))]
+    pub(crate) latitude_deg: f64,
+    /// Where it starts: longitude, WGS-84 degrees, east positive.
+    #[schemars(range(min = -180.0, max = 180.0))]
+    pub(crate) longitude_deg: f64,
+    /// Speed over ground in metres a second. Default: 0, it stands still.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub(crate) speed_m_per_s: f64,
+    /// Degrees turned a second, to the right positive. Default: 0, straight on.
+    #[serde(default)]
+    #[schemars(range(min = -360.0, max = 360.0))]
+    pub(crate) turn_rate_deg_per_s: f64,
+    /// Reports a second. Default: 1.
+    #[serde(default = "rate_hz")]
+    #[schemars(range(min = 0.001, max = 1000.0))]
+    pub(crate) rate_hz: f64,
+}
+
+fn rate_hz() -> f64 {
+    1.0
+}
+
+impl Track {
+    /// Checks what the types do not.
+    pub(super) fn check(self) -> Result<Self, Fault> {
+        if self.service.get() < SERVICE_MIN {
+            return Err(Fault::new(
+                "service",
+                format!("service {} is not for a configuration to give", self.service),
+                "give 100 or more; 1 to 19 are built in, 20 to 99 are bridges",
+            ));
+        }
+        in_range("latitude_deg", self.latitude_deg, -90.0..=90.0, "degrees")?;
+        in_range("longitude_deg", self.longitude_deg, -180.0..=180.0, "degrees")?;
+        in_range("speed_m_per_s", self.speed_m_per_s, 0.0..=1000.0, "metres a second")?;
+        in_range("turn_rate_deg_per_s", self.turn_rate_deg_per_s, -360.0..=360.0, "degrees a second")?;
+        in_range("rate_hz", self.rate_hz, 0.001..=1000.0, "reports a second")?;
+        Ok(self)
+    }
+}
