@@ -17,6 +17,7 @@ mod schema;
 mod value;
 mod verify;
 mod writer;
+mod xml;
 
 pub mod cmasi;
 pub mod impact;
@@ -43,3 +44,4 @@ pub use schema::{Count, EnumInfo, FieldInfo, Kind, Series, SeriesName, TypeInfo}
 pub use value::{Enumeration, List, Reference, Slot, Value, View};
 pub use verify::{Verification, verify};
 pub use writer::{Encoded, Writer};
+pub use xml::{Document, Placed, Warning, WarningKind, XmlError, XmlFault, XmlTextError, read_xml, to_xml};

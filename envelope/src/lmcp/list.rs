@@ -95,8 +95,8 @@ impl<T: Value> List for Vec<T> {
     fn element(&self, index: usize) -> Option<View<'_>> {
         self.get(index).map(T::view)
     }
-    fn clear(&mut self) {
-        self.clear();
+    fn truncate(&mut self, length: usize) {
+        self.truncate(length);
     }
     fn place(&mut self, index: usize) -> Option<Slot<'_>> {
         if index == self.len() {
@@ -113,8 +113,8 @@ impl<T: Value, const N: usize> List for [T; N] {
     fn element(&self, index: usize) -> Option<View<'_>> {
         self.get(index).map(T::view)
     }
-    fn clear(&mut self) {
-        *self = Self::blank();
+    fn truncate(&mut self, length: usize) {
+        self.iter_mut().skip(length).for_each(|element| *element = T::blank());
     }
     fn place(&mut self, index: usize) -> Option<Slot<'_>> {
         self.get_mut(index).map(T::slot)

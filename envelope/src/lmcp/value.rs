@@ -83,8 +83,8 @@ pub trait List {
     fn length(&self) -> usize;
     /// The element at `index`.
     fn element(&self, index: usize) -> Option<View<'_>>;
-    /// Removes all elements, or makes those of a fixed array blank.
-    fn clear(&mut self);
+    /// Removes the elements from `length` on, or makes those of a fixed array blank.
+    fn truncate(&mut self, length: usize);
     /// The place of the element at `index`; the one after the last is appended. None beyond that,
     /// and beyond the length of a fixed array.
     fn place(&mut self, index: usize) -> Option<Slot<'_>>;
