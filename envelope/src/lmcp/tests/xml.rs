@@ -67,6 +67,18 @@ fn scenario_files_are_read_stably_and_ill_formed_ones_named() {
 }
 
 #[test]
+fn a_recorded_mission_is_read_stably() {
+    let Some(folder) = shared("waterway-trace") else { return };
+    let paths: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert_eq!(paths.len(), 17);
+    for path in paths {
+        let document = read_xml(&read(&path)).unwrap();
+        assert_eq!(document.objects.len(), 1);
+        assert_stable(document.objects[0].object.as_ref(), &path);
+    }
+}
+
+#[test]
 fn every_type_goes_through_xml() {
     for message in golden_messages() {
         let object = decode(&message).unwrap();
