@@ -17,6 +17,7 @@ mod schema;
 mod value;
 mod verify;
 mod writer;
+mod xml;
 
 pub mod cmasi;
 pub mod impact;
@@ -38,8 +39,9 @@ pub use object::{Object, Struct};
 pub use peek::{Position, position};
 pub use reader::{DEPTH_MAX, Decoded, Header, MEMORY_FACTOR, MEMORY_FLOOR, Reader};
 pub use reference::Ref;
-pub use registry::{descendants, series_named, type_in, type_of, types};
+pub use registry::{descendants, type_in, type_of, types};
 pub use schema::{Count, EnumInfo, FieldInfo, Kind, Series, SeriesName, TypeInfo};
 pub use value::{Enumeration, List, Reference, Slot, Value, View};
 pub use verify::{Verification, verify};
 pub use writer::{Encoded, Writer};
+pub use xml::{Document, Placed, Warning, WarningKind, XmlError, XmlFault, XmlTextError, read_xml, to_xml};

@@ -26,7 +26,6 @@ impl<T> DerefMut for LargeArray<T> {
 
 impl<T: Value> Value for Vec<T> {
     const KIND: Kind = Kind::List(&T::KIND, Count::U16);
-    const SIZE_MIN: usize = 2;
     fn blank() -> Self {
         Self::new()
     }
@@ -48,7 +47,6 @@ impl<T: Value> Value for Vec<T> {
 
 impl<T: Value> Value for LargeArray<T> {
     const KIND: Kind = Kind::List(&T::KIND, Count::U32);
-    const SIZE_MIN: usize = 4;
     fn blank() -> Self {
         Self(Vec::new())
     }
@@ -70,12 +68,11 @@ impl<T: Value> Value for LargeArray<T> {
 
 impl<T: Value, const N: usize> Value for [T; N] {
     const KIND: Kind = Kind::List(&T::KIND, Count::Fixed(N));
-    const SIZE_MIN: usize = T::SIZE_MIN * N;
     fn blank() -> Self {
         std::array::from_fn(|_| T::blank())
     }
     fn decode(&mut self, reader: &mut Reader<'_>) -> Decoded<()> {
-        decode_in_place(self, reader)
+        decode_in_place(self, 0, reader)
     }
     fn encode(&self, writer: &mut Writer<'_>) -> Encoded {
         encode_elements(self, writer)
@@ -95,8 +92,8 @@ impl<T: Value> List for Vec<T> {
     fn element(&self, index: usize) -> Option<View<'_>> {
         self.get(index).map(T::view)
     }
-    fn clear(&mut self) {
-        self.clear();
+    fn truncate(&mut self, length: usize) {
+        self.truncate(length);
     }
     fn place(&mut self, index: usize) -> Option<Slot<'_>> {
         if index == self.len() {
@@ -113,26 +110,33 @@ impl<T: Value, const N: usize> List for [T; N] {
     fn element(&self, index: usize) -> Option<View<'_>> {
         self.get(index).map(T::view)
     }
-    fn clear(&mut self) {
-        *self = Self::blank();
+    fn truncate(&mut self, length: usize) {
+        self.iter_mut().skip(length).for_each(|element| *element = T::blank());
     }
     fn place(&mut self, index: usize) -> Option<Slot<'_>> {
         self.get_mut(index).map(T::slot)
     }
 }
 
-/// Reads `count` elements, once the bytes that are left and the memory allowed can hold them.
+/// Reads `count` elements, if so many can be in the bytes that are left. Room is made for as many as
+/// these bytes can hold if none is null, and for more as nulls are met.
 fn decode_elements<T: Value>(list: &mut Vec<T>, count: usize, reader: &mut Reader<'_>) -> Decoded<()> {
-    reader.bound(count, T::SIZE_MIN)?;
-    reader.allocate(count.saturating_mul(size_of::<T>()))?;
+    reader.bound(count, const { T::KIND.size_min() })?;
     list.clear();
-    list.reserve_exact(count);
-    list.resize_with(count, T::blank);
-    decode_in_place(list, reader)
+    while list.len() < count {
+        let read = list.len();
+        let room = (reader.left() / const { T::KIND.size_full() } + 1).min(count - read);
+        reader.allocate((read + room).saturating_mul(size_of::<T>()))?;
+        list.reserve_exact(room);
+        list.resize_with(read + room, T::blank);
+        decode_in_place(list, read, reader)?;
+    }
+    Ok(())
 }
 
-fn decode_in_place<T: Value>(list: &mut [T], reader: &mut Reader<'_>) -> Decoded<()> {
-    for (index, element) in list.iter_mut().enumerate() {
+/// Reads the elements from `start` on.
+fn decode_in_place<T: Value>(list: &mut [T], start: usize, reader: &mut Reader<'_>) -> Decoded<()> {
+    for (index, element) in list.iter_mut().enumerate().skip(start) {
         element.decode(reader).map_err(|error| error.in_element(index))?;
     }
     Ok(())

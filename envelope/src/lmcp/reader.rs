@@ -13,11 +13,12 @@ pub type Decoded<T> = Result<T, Box<DecodeError>>;
 pub const DEPTH_MAX: u8 = 16;
 
 /// Bytes of decoded form that one byte of a message may take. A null in an array is one byte on the
-/// wire and some dozens in memory; no array of real objects takes more than three for one.
+/// wire and some dozens in memory; arrays of real objects take about three for one.
 pub const MEMORY_FACTOR: usize = 4;
 
-/// Bytes of decoded form that any message may take, however short it is.
-pub const MEMORY_FLOOR: usize = 64 * 1024;
+/// Bytes of decoded form that any message may take, however short it is. Objects with all texts and
+/// arrays empty take up to eight for one: this is for the 16 of them that the model allows in an array.
+pub const MEMORY_FLOOR: usize = 8 * 1024;
 
 /// A cursor over the bytes of a message.
 #[derive(Debug)]

@@ -87,7 +87,6 @@ impl<T: Struct> Ref<T> {
 
 impl<T: Struct> Value for Ref<T> {
     const KIND: Kind = Kind::Object(T::TYPE);
-    const SIZE_MIN: usize = 1;
     fn blank() -> Self {
         Self::NULL
     }

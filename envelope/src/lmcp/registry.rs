@@ -2,7 +2,7 @@
 
 use super::error::DecodeFault;
 use super::reader::Header;
-use super::schema::{Series, SeriesName, TypeInfo};
+use super::schema::{Series, TypeInfo};
 use super::{cmasi, impact, perceive, route, uxnative, uxtask, vehicles};
 
 /// A series with its types in the order of their numbers.
@@ -105,9 +105,4 @@ const fn complete<const N: usize>(table: [Option<&'static TypeInfo>; N]) -> [&'s
         i += 1;
     }
     full
-}
-
-/// The name of a series, looked up as text.
-pub fn series_named(name: SeriesName) -> Option<&'static Series> {
-    REGISTRY.iter().map(|entry| entry.series).find(|series| series.name == name)
 }

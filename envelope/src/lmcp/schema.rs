@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::object::Object;
+use super::reader::HEADER;
 
 /// The name of a series as the wire carries it: up to eight ASCII characters, zero padded, as one
 /// big-endian number.
@@ -104,47 +105,35 @@ impl TypeInfo {
         self.lineage().flat_map(|info| info.own_fields).find(|field| field.name == name)
     }
 
-    /// How many bytes of fields precede the own field `name`, when all of them have a fixed width.
+    /// How many bytes of fields precede the field `name` of a type without a parent, when all of
+    /// them have a fixed width.
     pub(super) const fn offset_of(&self, name: &str) -> Option<usize> {
-        let mut offset = match self.parent {
-            Some(parent) => match parent.width() {
-                Some(width) => width,
-                None => return None,
-            },
-            None => 0,
-        };
-        let mut i = 0;
-        while i < self.own_fields.len() {
-            if same_text(self.own_fields[i].name, name) {
-                return Some(offset);
-            }
+        if self.parent.is_some() {
+            return None;
+        }
+        let (mut offset, mut i) = (0, 0);
+        while i < self.own_fields.len() && !same_text(self.own_fields[i].name, name) {
             match self.own_fields[i].kind.width() {
                 Some(width) => offset += width,
                 None => return None,
             }
             i += 1;
         }
-        None
+        if i < self.own_fields.len() { Some(offset) } else { None }
     }
 
-    /// How many bytes all fields take, when all of them have a fixed width.
-    const fn width(&self) -> Option<usize> {
-        let mut width = match self.parent {
-            Some(parent) => match parent.width() {
-                Some(width) => width,
-                None => return None,
-            },
+    /// The fewest bytes that all fields take.
+    const fn size_min(&self) -> usize {
+        let mut size = match self.parent {
+            Some(parent) => parent.size_min(),
             None => 0,
         };
         let mut i = 0;
         while i < self.own_fields.len() {
-            match self.own_fields[i].kind.width() {
-                Some(field) => width += field,
-                None => return None,
-            }
+            size += self.own_fields[i].kind.size_min();
             i += 1;
         }
-        Some(width)
+        size
     }
 }
 
@@ -234,6 +223,28 @@ impl Kind {
                 None => None,
             },
             Self::Text | Self::Object(_) | Self::List(..) => None,
+        }
+    }
+
+    /// The fewest bytes that a value of this kind takes.
+    pub(super) const fn size_min(&self) -> usize {
+        match self {
+            Self::Object(_) => 1,
+            Self::Text | Self::List(_, Count::U16) => 2,
+            Self::List(_, Count::U32) => 4,
+            Self::List(element, Count::Fixed(count)) => element.size_min() * *count,
+            _ => match self.width() {
+                Some(width) => width,
+                None => panic!("all other kinds have a width"),
+            },
+        }
+    }
+
+    /// The fewest bytes that a value of this kind takes if it is not null.
+    pub(super) const fn size_full(&self) -> usize {
+        match self {
+            Self::Object(info) => HEADER + info.size_min(),
+            _ => self.size_min(),
         }
     }
 }

@@ -3,6 +3,8 @@
 mod golden;
 mod hostile;
 mod model;
+mod roundtrip;
+mod xml;
 
 use std::path::{Path, PathBuf};
 

@@ -10,8 +10,6 @@ use super::writer::{Encoded, Writer};
 pub trait Value: Sized {
     /// What the schema says of it.
     const KIND: Kind;
-    /// The fewest bytes that one takes on the wire, by which a count is bounded.
-    const SIZE_MIN: usize;
     /// The value that an array element has before it is read.
     fn blank() -> Self;
     /// Reads it from the wire. Whatever is read is written back as the same bytes.
@@ -83,8 +81,8 @@ pub trait List {
     fn length(&self) -> usize;
     /// The element at `index`.
     fn element(&self, index: usize) -> Option<View<'_>>;
-    /// Removes all elements, or makes those of a fixed array blank.
-    fn clear(&mut self);
+    /// Removes the elements from `length` on, or makes those of a fixed array blank.
+    fn truncate(&mut self, length: usize);
     /// The place of the element at `index`; the one after the last is appended. None beyond that,
     /// and beyond the length of a fixed array.
     fn place(&mut self, index: usize) -> Option<Slot<'_>>;
@@ -105,7 +103,6 @@ macro_rules! number {
     ($type:ty, $variant:ident) => {
         impl Value for $type {
             const KIND: Kind = Kind::$variant;
-            const SIZE_MIN: usize = size_of::<$type>();
             fn blank() -> Self {
                 Self::default()
             }
@@ -138,7 +135,6 @@ number!(f64, Real64);
 
 impl Value for bool {
     const KIND: Kind = Kind::Bool;
-    const SIZE_MIN: usize = 1;
     fn blank() -> Self {
         false
     }
@@ -162,7 +158,6 @@ impl Value for bool {
 
 impl Value for String {
     const KIND: Kind = Kind::Text;
-    const SIZE_MIN: usize = 2;
     fn blank() -> Self {
         Self::new()
     }
@@ -202,7 +197,6 @@ pub trait Enumeration: Copy {
 
 impl<T: Enumeration> Value for T {
     const KIND: Kind = Kind::Enum(T::INFO);
-    const SIZE_MIN: usize = 4;
     fn blank() -> Self {
         T::FIRST
     }

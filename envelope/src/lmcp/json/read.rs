@@ -167,7 +167,7 @@ fn read_reference(json: &Json, reference: &mut dyn Reference) -> Read<()> {
 
 fn read_list(json: &Json, list: &mut dyn List) -> Read<()> {
     let Some(items) = json.as_array() else { return fail(JsonFault::Expected("an array")) };
-    list.clear();
+    list.truncate(0);
     for (index, item) in items.iter().enumerate() {
         let Some(place) = list.place(index) else { break };
         if let Err(mut error) = read_value(item, place) {

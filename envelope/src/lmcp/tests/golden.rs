@@ -81,3 +81,28 @@ fn every_message_equals_the_json_beside_it_both_ways() {
         assert_eq!(encode(object.as_ref()).unwrap(), message, "{}", path.display());
     }
 }
+
+/// Payloads of frames `address$attributes$payload`, each after 8 bytes of time and 4 of length.
+fn captured_payloads(capture: &[u8]) -> Vec<&[u8]> {
+    let mut payloads = Vec::new();
+    let mut rest = capture;
+    while let Some((head, tail)) = rest.split_first_chunk::<12>() {
+        let length = u32::from_le_bytes([head[8], head[9], head[10], head[11]]) as usize;
+        let (frame, tail) = tail.split_at(length);
+        payloads.extend(frame.splitn(3, |&byte| byte == b'$').nth(2));
+        rest = tail;
+    }
+    payloads
+}
+
+#[test]
+fn what_a_running_planner_sent_comes_back_as_the_same_bytes() {
+    let Some(folder) = shared("captures/waterway") else { return };
+    let capture = read(&folder.join("pub_capture.bin"));
+    let payloads = captured_payloads(&capture);
+    assert_eq!(payloads.len(), 28);
+    for payload in payloads {
+        let object = decode(payload).unwrap();
+        assert_eq!(encode(object.as_ref()).unwrap(), payload, "{}", object.type_info());
+    }
+}
