@@ -1,6 +1,14 @@
-//! The program.
+//! Aldis: a Zenoh-based gateway for fleets of unmanned vehicles.
+//!
+//! This program only moves bytes: everything that has a meaning is decided in `aldis-services`.
 
-#[allow(dead_code, unused_imports)]
+mod bridge;
+mod bus;
+mod cli;
+mod clock;
 mod config;
+mod runtime;
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    cli::main()
+}

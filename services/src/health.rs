@@ -143,7 +143,7 @@ impl Service for Health {
                 self.own.clear();
                 self.next = None;
             }
-            Input::Started | Input::CallEnded(..) | Input::Job(..) | Input::Note(_) => {}
+            _ => {}
         }
     }
 

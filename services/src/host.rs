@@ -104,6 +104,10 @@ impl Hosted {
         self.service.is_some()
     }
 
+    pub(crate) fn follows_bus(&self) -> bool {
+        self.service.as_ref().is_some_and(|service| service.follows_bus())
+    }
+
     pub(crate) fn state(&self) -> &'static str {
         match (self.is_running(), self.retired) {
             (true, _) => "running",

@@ -13,7 +13,7 @@ use crate::event::{BridgeId, Effect, Event, PeerId, PublisherId};
 use crate::host::Hosted;
 use crate::labels::Labels;
 use crate::notes::Notes;
-use crate::service::{Component, ComponentHealth, Condition, Level, ServiceSpec};
+use crate::service::{Component, ComponentHealth, Condition, Input, Level, ServiceSpec};
 use crate::streams::{Inbound, Outbound};
 use aldis_envelope::{
     Address, BootId, EntityId, Fleet, KeyHash, Keys, Label, Message, Monotonic, Now, Prefix, Priority,
@@ -163,11 +163,13 @@ impl Node {
             Event::Alive(source, alive) => {
                 self.alive.set(source, alive);
                 self.tokens_changed(now, effects);
+                self.tell_followers(now, || Input::Token(source, alive), effects);
             }
             Event::AliveKnown => {
                 self.alive.set_known(true);
                 self.tokens_changed(now, effects);
                 self.send_waiting_calls();
+                self.tell_followers(now, || Input::Bus(true), effects);
             }
             Event::BusOpened => self.bus_opened(now, effects),
             Event::BusClosed(why) => self.bus_closed(now, &why, effects),
@@ -211,6 +213,7 @@ impl Node {
         if std::mem::take(&mut self.bus_is_open) {
             self.inbound.went_offline();
             self.alive.set_known(false);
+            self.tell_followers(now, || Input::Bus(false), effects);
         }
         self.bus_health(now, Condition::Failed, why.to_owned());
         self.say(now, Level::Warning, "bus", format!("no session on the bus: {why}"), effects);

@@ -16,6 +16,11 @@ pub trait Service: Send {
         Vec::new()
     }
 
+    /// Whether it wants [`Input::Bus`] and [`Input::Token`].
+    fn follows_bus(&self) -> bool {
+        false
+    }
+
     /// Takes one input. What it puts into the outbox is sent after it returns; it never gets its own messages back.
     fn handle(&mut self, now: Now, input: Input<'_>, out: &mut Outbox);
 
@@ -36,6 +41,10 @@ pub enum Input<'a> {
     CallEnded(CallId, Result<(), Refusal>),
     /// The deadline that it asked for has come.
     Deadline,
+    /// The session on the bus is up and knows who is alive (true), or it is down. Only for those that follow the bus.
+    Bus(bool),
+    /// A service of another node is alive (true), or no longer. Only for those that follow the bus.
+    Token(Source, bool),
     /// A job of its own is done, or panicked with this text.
     Job(u64, Result<JobOutput, String>),
     /// The health of a part of the node changed. Only the health service gets it.

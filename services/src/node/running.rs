@@ -155,6 +155,14 @@ impl Node {
         }
     }
 
+    pub(super) fn tell_followers(&mut self, now: Now, input: impl Fn() -> Input<'static>, effects: &mut Vec<Effect>) {
+        for place in 0..self.services.len() {
+            if self.services[place].follows_bus() {
+                self.run(now, place, input(), effects);
+            }
+        }
+    }
+
     pub(super) fn deadline(&mut self, now: Now, effects: &mut Vec<Effect>) {
         self.armed = None;
         for ended in self.calls.expire(now.monotonic) {

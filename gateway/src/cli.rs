@@ -1,0 +1,82 @@
+//! The command line.
+
+mod call;
+mod check;
+mod exit;
+mod fleet;
+mod member;
+mod messages;
+mod run;
+mod telemetry;
+mod within;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// How long joining the bus may take before it is said to be out of reach.
+const JOIN_WITHIN: std::time::Duration = std::time::Duration::from_secs(5);
+
+const AFTER_HELP: &str = "\
+Two commands to begin with:
+  aldis demo                          a shore station and three boats in one process
+  aldis run configs/shore.toml        a node; in other terminals:
+  aldis sub afrl.cmasi                what comes by
+  aldis call eid400sid1 --ping        is vehicle 400 there?
+
+Exit codes: 0 done; 1 it failed; 2 wrong usage or configuration, nothing was started;
+3 nobody is there; 4 no answer before the deadline; 5 the bus is out of reach.";
+
+/// A gateway for fleets of unmanned vehicles: UMAA and UxAS messages in envelopes over Zenoh.
+#[derive(Parser)]
+#[command(name = "aldis", version, after_help = AFTER_HELP, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Run a node until it is stopped (SIGINT or SIGTERM).
+    Run(run::Run),
+    /// Say what is wrong with configurations, if anything.
+    Check(check::Check),
+    /// Print the access control of the routers for these nodes.
+    Acl(check::Acl),
+    /// Print the JSON Schema of a configuration.
+    Schema(check::Schema),
+    /// Publish a message.
+    Pub(messages::Publish),
+    /// Show messages as they come.
+    Sub(messages::Subscribe),
+    /// Call a service, a mailbox or all services of an entity.
+    Call(call::CallArgs),
+    /// Show who is there.
+    Fleet(fleet::FleetArgs),
+}
+
+/// Runs what the command line says.
+pub(crate) fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let done = match cli.command {
+        Command::Run(args) => args.run(),
+        Command::Check(args) => args.run(),
+        Command::Acl(args) => args.run(),
+        Command::Schema(args) => args.run(),
+        Command::Pub(args) => args.run(),
+        Command::Sub(args) => args.run(),
+        Command::Call(args) => args.run(),
+        Command::Fleet(args) => args.run(),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => failure.report(),
+    }
+}
+
+/// Writes a line for people or machines; a reader that is gone ends the program quietly, as programs in pipes do.
+pub(crate) fn print_line(line: impl std::fmt::Display) {
+    use std::io::Write;
+    if writeln!(std::io::stdout().lock(), "{line}").is_err() {
+        std::process::exit(0);
+    }
+}

@@ -1,0 +1,54 @@
+//! `aldis run`: a node until it is stopped.
+
+use super::exit::Failure;
+use super::telemetry;
+use crate::config::Config;
+use crate::runtime::{self, Control};
+use std::path::PathBuf;
+use tokio::signal::unix::{SignalKind, signal};
+use tokio::sync::mpsc;
+
+/// Run a node until it is stopped (SIGINT or SIGTERM).
+///
+/// The node ends in order: it disposes its health reports and withdraws its tokens, within a bound of five seconds.
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  aldis run configs/shore.toml")]
+pub(crate) struct Run {
+    /// The node's configuration.
+    config: PathBuf,
+}
+
+impl Run {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let config = Config::load(&self.config)?;
+        let outside = runtime::outside(&config).map_err(|why| Failure::Usage(why.to_string()))?;
+        telemetry::start(&config.log);
+        tracing::info!("{}: entity {} of fleet {}", config.name.as_str(), config.entities.own(), config.fleet);
+        let (control, controlled) = mpsc::unbounded_channel();
+        watch_signals(control)?;
+        runtime::run(runtime::node_config(&config), outside, controlled).map_err(|why| Failure::Failed(why.to_string()))
+    }
+}
+
+/// Asks for an orderly end at the first signal.
+pub(crate) fn watch_signals(control: mpsc::UnboundedSender<Control>) -> Result<(), Failure> {
+    let failed = |why: std::io::Error| Failure::Failed(format!("cannot watch for signals: {why}"));
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
+    let watch = move || {
+        runtime.block_on(async {
+            let (Ok(mut interrupt), Ok(mut terminate)) =
+                (signal(SignalKind::interrupt()), signal(SignalKind::terminate()))
+            else {
+                tracing::error!("cannot watch for signals");
+                return;
+            };
+            tokio::select! {
+                _ = interrupt.recv() => {}
+                _ = terminate.recv() => {}
+            }
+            let _ = control.send(Control::Shutdown);
+        });
+    };
+    std::thread::Builder::new().name("signals".into()).spawn(watch).map_err(failed)?;
+    Ok(())
+}
