@@ -1,22 +1,22 @@
 //! The access control of the fleet's routers, from the configurations of its nodes.
 //!
 //! Denied is what no rule allows. A node may send only as its own entities: whatever it puts, deletes, answers or
-//! declares itself alive with has one of them as source in the key. It may read everything of its fleet. So a receiver
-//! can believe the source in a key, because the router does not pass on any other.
+//! declares itself alive with has one of them as source in the key. It may read everything of its fleet. So a
+//! receiver can believe the source in a key, because the router does not pass on any other.
 //!
-//! A node is known to the router by `bus.user` (`name` where it has none) and its password, or, with `enable_mtls` and a
-//! `connect_certificate`, by the common name of that certificate, which must be `name`; one that has both must show
-//! both. An entity of `operators` that no configuration speaks for is the user whose name is its number: the command
-//! line joins as `9000`. An operator with another user name or a certificate has a configuration of its own, given to
-//! `acl` with the others.
+//! A node is known to the router by `bus.user` (`name` where it has none) and its password, or, with `enable_mtls`
+//! and a `connect_certificate`, by the common name of that certificate, which must be `name`; one that has both must
+//! show both. An entity of `operators` that no configuration speaks for is the user whose name is its number: the
+//! command line joins as `9000`. An operator with another user name or a certificate has a configuration of its own,
+//! given to `acl` with the others.
 
 use super::Config;
 use aldis_envelope::{EntityId, Fleet, Keys};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The spaces beside the data, each followed by the source's entity. No wildcard of Zenoh matches an `@` chunk, so that
-/// each is named on its own. In `@alive` there are tokens alone.
+/// The spaces beside the data, each followed by the source's entity. No wildcard of Zenoh matches an `@` chunk, so
+/// that each is named on its own. In `@alive` there are tokens alone.
 const SPACES: [&str; 4] = ["@writer", "@state", "@ack", "@link"];
 const ALIVE: &str = "@alive";
 

@@ -3,7 +3,8 @@
 use super::cure::cured;
 use super::schema;
 use super::text::RequestPrefix;
-use aldis_envelope::{Descriptor, EntityId, ServiceId};
+use aldis_envelope::{EntityId, ServiceId};
+use aldis_services::allow::AllowRule;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -25,17 +26,19 @@ pub(crate) struct Allow {
 }
 
 impl Allow {
-    /// Whether the rule allows a request.
-    pub(crate) fn allows(&self, from: EntityId, service: ServiceId, request: &Descriptor) -> bool {
-        let caller = match &self.from {
-            Callers::Any => true,
-            Callers::Only(entities) => entities.contains(&from),
-        };
-        let called = match self.service {
-            Called::Any => true,
-            Called::Only(id) => id == service,
-        };
-        caller && called && self.requests.iter().any(|prefix| prefix.matches(request))
+    /// The rule as the node reads it; it alone decides.
+    pub(crate) fn rule(&self) -> AllowRule {
+        AllowRule {
+            from: match &self.from {
+                Callers::Any => None,
+                Callers::Only(entities) => Some(entities.clone()),
+            },
+            service: match self.service {
+                Called::Any => None,
+                Called::Only(service) => Some(service),
+            },
+            requests: self.requests.iter().map(|prefix| prefix.as_str().to_owned()).collect(),
+        }
     }
 }
 

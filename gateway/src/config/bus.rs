@@ -72,8 +72,8 @@ pub(crate) enum Mode {
     /// from one peer to another: peers that shall hear each other are joined to each other, or use gossip.
     #[default]
     Peer,
-    /// Joined to one router or peer at `connect`, which passes everything on. Opening the bus fails while none of them
-    /// answers, and is to be tried again; a bus that was open comes back by itself.
+    /// Joined to one router or peer at `connect`, which passes everything on. Opening the bus fails while none of
+    /// them answers, and is to be tried again; a bus that was open comes back by itself.
     Client,
     /// Passes messages on between its clients, and checks their rights.
     Router,

@@ -1,5 +1,5 @@
-//! From the texts of the TOML reader to a cure. Serde hands errors on as text alone, so types of this module that know
-//! their own cure write it on a second line; for all others the cure is found by the text.
+//! From the texts of the TOML reader to a cure. Serde hands errors on as text alone, so types of this module that
+//! know their own cure write it on a second line; for all others the cure is found by the text.
 
 /// The text of an error that brings its own cure.
 pub(crate) fn cured(message: impl std::fmt::Display, cure: &str) -> String {

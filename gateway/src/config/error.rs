@@ -35,7 +35,8 @@ impl fmt::Display for Fault {
     }
 }
 
-/// Why a configuration is refused. It holds the first mistake; what else was found hangs below it and is drawn after it.
+/// Why a configuration is refused. It holds the first mistake; what else was found hangs below it and is drawn after
+/// it.
 #[derive(Debug, Clone)]
 pub(crate) struct ConfigError(Box<Mistake>);
 

@@ -1,5 +1,5 @@
-//! The JSON Schema of a configuration, from the very types that read it. The types of the envelope are described here,
-//! because the envelope does not know about schemas.
+//! The JSON Schema of a configuration, from the very types that read it. The types of the envelope are described
+//! here, because the envelope does not know about schemas.
 
 use super::Config;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};

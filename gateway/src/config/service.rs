@@ -3,7 +3,8 @@
 use super::bridge::in_range;
 use super::error::Fault;
 use super::schema;
-use aldis_envelope::{EntityId, ServiceId};
+use aldis_envelope::{EntityId, ServiceId, Source};
+use aldis_services::track::TrackConfig;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -54,6 +55,10 @@ pub(crate) struct Track {
     /// Where it starts: longitude, WGS-84 degrees, east positive.
     #[schemars(range(min = -180.0, max = 180.0))]
     pub(crate) longitude_deg: f64,
+    /// Where it heads at first, degrees from north to the right. Default: 0, north.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 360.0))]
+    pub(crate) heading_deg: f64,
     /// Speed over ground in metres a second. Default: 0, it stands still.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1000.0))]
@@ -73,6 +78,24 @@ fn rate_hz() -> f64 {
 }
 
 impl Track {
+    /// The ids of the service, on a node whose own entity is given.
+    pub(crate) fn source(&self, own: EntityId) -> Source {
+        Source::new(self.entity.unwrap_or(own), self.service)
+    }
+
+    /// How the vehicle moves, as the service wants to know it.
+    pub(crate) fn motion(&self, own: EntityId) -> TrackConfig {
+        TrackConfig {
+            entity: self.entity.unwrap_or(own),
+            latitude_deg: self.latitude_deg,
+            longitude_deg: self.longitude_deg,
+            heading_deg: self.heading_deg,
+            speed_m_per_s: self.speed_m_per_s,
+            turn_rate_deg_per_s: self.turn_rate_deg_per_s,
+            rate_hz: self.rate_hz,
+        }
+    }
+
     /// Checks what the types do not.
     pub(super) fn check(self) -> Result<Self, Fault> {
         if self.service.get() < SERVICE_MIN {
@@ -84,6 +107,7 @@ impl Track {
         }
         in_range("latitude_deg", self.latitude_deg, -90.0..=90.0, "degrees")?;
         in_range("longitude_deg", self.longitude_deg, -180.0..=180.0, "degrees")?;
+        in_range("heading_deg", self.heading_deg, 0.0..=360.0, "degrees")?;
         in_range("speed_m_per_s", self.speed_m_per_s, 0.0..=1000.0, "metres a second")?;
         in_range("turn_rate_deg_per_s", self.turn_rate_deg_per_s, -360.0..=360.0, "degrees a second")?;
         in_range("rate_hz", self.rate_hz, 0.001..=1000.0, "reports a second")?;

@@ -173,9 +173,8 @@ fn duplicates() {
         "leave one",
     );
     let second = |name: &str, service: u32, port: u32| {
-        format!(
-            "{TOP}{BRIDGE}{LISTEN}[[bridge]]\nkind = \"uxas-tcp\"\nname = \"{name}\"\nservice = {service}\nlisten = \"127.0.0.1:{port}\""
-        )
+        let other = BRIDGE.replace("uxas\"", &format!("{name}\"")).replace("20", &service.to_string());
+        format!("{TOP}{BRIDGE}{LISTEN}{other}listen = \"127.0.0.1:{port}\"")
     };
     assert!(Config::parse("", &second("b", 21, 1)).is_ok());
     assert_mistake(
@@ -228,13 +227,12 @@ fn rules_of_allow() {
     assert_mistake(&rule("\"any\"", "-1"), (5, 11), "`-1` is no service id", "service = 37");
     let text = format!("{}requests = [\"aldis.\"]\n", rule("[1, 9000]", "37"));
     let config = Config::parse("", &text).unwrap();
-    let allows = |from: u64, service: u64, request: &str| {
-        let (from, service) = (aldis_envelope::EntityId::new(from), aldis_envelope::ServiceId::new(service));
-        let request = aldis_envelope::Descriptor::new(request).unwrap();
-        config.allow[0].allows(from.unwrap(), service.unwrap(), &request)
-    };
-    assert!(allows(9000, 37, "aldis.ping"));
-    assert!(!allows(9001, 37, "aldis.ping") && !allows(1, 36, "aldis.ping") && !allows(1, 37, "ping"));
+    let rule = config.allow[0].rule();
+    assert_eq!(rule.from.unwrap().iter().map(|e| e.get()).collect::<Vec<_>>(), [1, 9000]);
+    assert_eq!((rule.service.unwrap().get(), rule.requests), (37, vec!["aldis.".to_owned()]));
+    let any = Config::parse("", &format!("{TOP}[[allow]]\nfrom = \"any\"\nservice = \"any\"")).unwrap();
+    let rule = any.allow[0].rule();
+    assert_eq!((rule.from, rule.service, rule.requests), (None, None, vec![String::new()]));
 }
 
 #[test]
@@ -267,7 +265,9 @@ fn defaults() {
     assert_eq!(bridge.stall_timeout(), Duration::from_secs(5));
     assert_eq!((&bridge.import, &bridge.export), (&vec![Prefix::all()], &vec![Prefix::all()]));
     let Service::Track(track) = &config.services[0];
-    assert_eq!((track.entity, track.speed_m_per_s, track.rate_hz), (None, 0.0, 1.0));
+    assert_eq!((track.heading_deg, track.speed_m_per_s, track.rate_hz), (0.0, 0.0, 1.0));
+    assert_eq!(track.source(config.entities.own()).to_string(), "eid400sid100");
+    assert_eq!(track.motion(config.entities.own()).latitude_deg, 59.0);
 }
 
 #[test]

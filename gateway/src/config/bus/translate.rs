@@ -83,8 +83,8 @@ type Settings = Vec<(&'static str, Value)>;
 fn links(bus: &Bus) -> Settings {
     let locators = |list: &[Locator]| json!(list.iter().map(Locator::as_str).collect::<Vec<_>>());
     // A peer or a router starts without those that it connects to and tries them in the background for ever (-1). A
-    // client is nothing without its one router: it tries each locator once (0) and says so, and the caller tries again,
-    // because with a time to wait Zenoh would stay with the first absent locator and never try the second.
+    // client is nothing without its one router: it tries each locator once (0) and says so, and the caller tries
+    // again, because with a time to wait Zenoh would stay with the first absent locator and never try the second.
     let timeout_ms = if bus.mode == Mode::Client { 0 } else { -1 };
     vec![
         ("mode", json!(bus.mode.as_str())),
@@ -114,7 +114,8 @@ fn scouting(scouting: Scouting) -> Settings {
 }
 
 /// What Aldis does itself or does not offer. The queues stay as Zenoh has them: congestion control is a property of
-/// each publisher, which takes it from `bus.congestion`, and Zenoh bounds a blocked one to 5 s before it closes the link.
+/// each publisher, which takes it from `bus.congestion`, and Zenoh bounds a blocked one to 5 s before it closes the
+/// link.
 fn quiet() -> Settings {
     vec![
         // Administration is service 1 of a node, under `[allow]`; Zenoh's own would pass it by.
@@ -133,7 +134,8 @@ fn tls(tls: &Tls) -> Value {
         "connect_private_key": tls.connect_private_key,
         "enable_mtls": tls.enable_mtls,
         "verify_name_on_connect": tls.verify_name_on_connect,
-        // A certificate that ends, ends its link: else a vehicle lost for good stays joined for as long as it stays up.
+        // A certificate that ends, ends its link: else a vehicle lost for good stays joined for as long as it stays
+        // up.
         "close_link_on_expiration": true,
     })
 }
