@@ -13,6 +13,7 @@ use crate::event::{BridgeId, Effect, Event, PeerId, PublisherId};
 use crate::host::Hosted;
 use crate::labels::Labels;
 use crate::notes::Notes;
+use crate::registry;
 use crate::service::{Component, ComponentHealth, Condition, Input, Level, ServiceSpec};
 use crate::streams::{Inbound, Outbound};
 use aldis_envelope::{
@@ -104,10 +105,11 @@ impl Node {
         if let Some(foreign) = sources.iter().find(|source| !config.entities.contains(&source.entity)) {
             return Err(format!("{foreign} is of an entity that node {own} does not speak for"));
         }
+        let stand_ins = config.bridges.iter().map(|bridge| registry::stand_in(bridge.source, &bridge.name));
         Ok(Self {
             keys: Keys::new(&config.fleet),
             allow: Allow::new(&config.entities, &config.operators, config.allow.clone()),
-            services: config.services.iter().cloned().map(Hosted::new).collect(),
+            services: config.services.iter().cloned().chain(stand_ins).map(Hosted::new).collect(),
             bridges: config.bridges.iter().map(|spec| Bridge::new(spec.clone(), &config.entities)).collect(),
             config,
             labels: Labels::default(),

@@ -24,10 +24,10 @@ pub enum Kind {
     Track(TrackConfig),
 }
 
-/// The node's own service is its host, which answers before a message gets here.
-struct NodeService;
+/// Stands where the host answers for itself: for the node at service 1, and for each bridge.
+struct StandIn;
 
-impl Service for NodeService {
+impl Service for StandIn {
     fn handle(&mut self, _: Now, input: Input<'_>, out: &mut Outbox) {
         if let Input::Message(envelope) = input {
             let what = envelope.message.label.descriptor().to_owned();
@@ -50,12 +50,17 @@ pub fn built_in(entity: EntityId, guids: &Guids, health_period: Duration) -> Vec
     ]
 }
 
+/// The service that answers pings for a bridge, which is no service itself.
+pub(crate) fn stand_in(source: Source, name: &str) -> ServiceSpec {
+    ServiceSpec { source, name: name.to_owned(), factory: Arc::new(|| Box::new(StandIn)) }
+}
+
 /// A service to run.
 pub fn service(source: Source, name: &str, kind: Kind, guids: &Guids) -> ServiceSpec {
     let guids = guids.clone();
     let factory = Arc::new(move || -> Box<dyn Service> {
         match &kind {
-            Kind::Node => Box::new(NodeService),
+            Kind::Node => Box::new(StandIn),
             Kind::Health { period } => Box::new(Health::new(source.entity, guids.clone(), *period)),
             Kind::Log => Box::new(Log::new(source.entity, &guids)),
             Kind::Track(track) => Box::new(Track::new(source, track.clone())),

@@ -66,7 +66,13 @@ impl Patience {
     }
 }
 
-async fn listen(core: Shared, bridge: BridgeId, address: SocketAddr, max: usize, paused: watch::Receiver<bool>) {
+async fn listen(
+    core: Shared,
+    bridge: BridgeId,
+    address: SocketAddr,
+    max: usize,
+    paused: watch::Receiver<bool>,
+) {
     let mut patience = Patience::new();
     let listener = loop {
         match TcpListener::bind(address).await {
@@ -92,7 +98,13 @@ async fn listen(core: Shared, bridge: BridgeId, address: SocketAddr, max: usize,
     }
 }
 
-async fn connect(core: Shared, bridge: BridgeId, address: SocketAddr, max: usize, paused: watch::Receiver<bool>) {
+async fn connect(
+    core: Shared,
+    bridge: BridgeId,
+    address: SocketAddr,
+    max: usize,
+    paused: watch::Receiver<bool>,
+) {
     let mut patience = Patience::new();
     loop {
         match TcpStream::connect(address).await {

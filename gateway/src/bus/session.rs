@@ -64,7 +64,9 @@ impl Bus {
         congestion: CongestionControl,
         inbox: Arc<Inbox>,
     ) -> Result<Self, BusError> {
-        let session = zenoh::open(config).await.map_err(failed("open the session"))?;
+        let doing = "open the session";
+        let session = off_the_loop(move || zenoh::open(config).wait()).await.map_err(failed(doing))?;
+        let session = session.map_err(failed(doing))?;
         Ok(Self {
             session,
             keys,
@@ -179,7 +181,8 @@ impl Bus {
             }
             _ => {
                 let content = ZBytes::from(envelope.message.content);
-                let put = self.session.put(key, content).congestion_control(self.congestion).priority(priority);
+                let put =
+                    self.session.put(key, content).congestion_control(self.congestion).priority(priority);
                 put.allowed_destination(Locality::Remote).attachment(header).wait()
             }
         };
@@ -215,14 +218,33 @@ impl Bus {
         self.session.is_closed()
     }
 
+    /// What is declared goes first; all of it on this thread, because dropping it may block too.
+    fn close_here(self) -> zenoh::Result<()> {
+        let Self { session, publishers, subscribers, tokens, learned, _alive, .. } = self;
+        drop((tokens, subscribers, publishers, learned, _alive));
+        session.close().wait()
+    }
+
     /// Closes the session, within a bound.
     pub(crate) async fn close(self) {
-        let Self { session, publishers, subscribers, tokens, .. } = self;
-        drop((tokens, subscribers, publishers));
-        if tokio::time::timeout(CLOSE_WITHIN, session.close()).await.is_err() {
-            tracing::warn!("the session on the bus did not close within {CLOSE_WITHIN:?}");
+        match tokio::time::timeout(CLOSE_WITHIN, off_the_loop(move || self.close_here())).await {
+            Ok(Ok(Ok(()))) => {}
+            Ok(Ok(Err(why))) => tracing::warn!("the session on the bus did not close well: {why}"),
+            Ok(Err(_)) | Err(_) => {
+                tracing::warn!("the session on the bus did not close within {CLOSE_WITHIN:?}")
+            }
         }
     }
+}
+
+/// Runs what Zenoh blocks in on a thread of its own: inside a runtime of one thread Zenoh refuses to block.
+async fn off_the_loop<T: Send + 'static>(
+    blocking: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, tokio::sync::oneshot::error::RecvError> {
+    let (tell, told) = tokio::sync::oneshot::channel();
+    // Where no thread can be had, the sender is dropped with the closure, and the caller is told so.
+    let _ = std::thread::Builder::new().name("bus".into()).spawn(move || tell.send(blocking()));
+    told.await
 }
 
 /// Says that all tokens are told when Zenoh has dropped the query's callback, which it does after the last reply.

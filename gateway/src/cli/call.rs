@@ -5,9 +5,7 @@ use super::member::{Desk, Join, Member};
 use super::messages::content_text;
 use super::print_line;
 use super::within::Within;
-use aldis_envelope::{
-    Address, ContentType, Descriptor, Envelope, Monotonic, Now, Refusal, Role, aldis,
-};
+use aldis_envelope::{Address, ContentType, Descriptor, Envelope, Monotonic, Now, Refusal, Role, aldis};
 use aldis_services::{Input, Outbox};
 use bytes::Bytes;
 use serde_json::{Value, json};
@@ -124,7 +122,8 @@ impl CallArgs {
             (None, None) => Bytes::new(),
         };
         let request = if self.ping { descriptor(aldis::PING).ok() } else { self.request.clone() };
-        let request = request.ok_or_else(|| Failure::Usage("a request needs a descriptor: --request NAME".into()))?;
+        let request =
+            request.ok_or_else(|| Failure::Usage("a request needs a descriptor: --request NAME".into()))?;
         let (tell, told) = mpsc::channel();
         let caller = Caller {
             address: self.address.clone(),

@@ -52,7 +52,9 @@ impl Check {
 /// Deny by default; each node may put, reply and show tokens for its own entities alone. A router loads it with
 /// `zenoh_config` in its `[bus]` table.
 #[derive(clap::Args)]
-#[command(after_help = "Example:\n  aldis acl configs/shore.toml configs/vehicle-400.toml > access-control.json5")]
+#[command(
+    after_help = "Example:\n  aldis acl configs/shore.toml configs/vehicle-400.toml > access-control.json5"
+)]
 pub(crate) struct Acl {
     /// The configurations of all nodes that join.
     #[arg(required = true)]

@@ -94,9 +94,13 @@ impl FleetArgs {
         for (&entity, services) in &seen.alive {
             match (seen.status.get(&entity), self.json) {
                 (Some(status), true) => print_line(status_text(status)),
-                (None, true) => print_line(json!({ "node": entity, "services_alive": services, "answers": false })),
+                (None, true) => {
+                    print_line(json!({ "node": entity, "services_alive": services, "answers": false }))
+                }
                 (Some(status), false) => print_status(status),
-                (None, false) => print_line(format_args!("entity {entity}: {} services, no answer", services.len())),
+                (None, false) => {
+                    print_line(format_args!("entity {entity}: {} services, no answer", services.len()))
+                }
             }
         }
         if seen.alive.is_empty() && !self.json {
@@ -111,8 +115,14 @@ fn print_status(status: &NodeStatus) {
     let uptime = Duration::from_millis(status.uptime_ms);
     print_line(format_args!("entity {} (speaks for {}), up {uptime:.0?}", status.node, entities.join(", ")));
     for service in &status.services {
-        print_line(format_args!("  {:<16} {:<12} {}", service.source.to_string(), service.name, service.state));
+        print_line(format_args!(
+            "  {:<16} {:<12} {}",
+            service.source.to_string(),
+            service.name,
+            service.state
+        ));
     }
-    let counted: Vec<_> = status.counters.iter().filter(|(_, v)| *v > 0).map(|(n, v)| format!("{n} {v}")).collect();
+    let counted: Vec<_> =
+        status.counters.iter().filter(|(_, v)| *v > 0).map(|(n, v)| format!("{n} {v}")).collect();
     print_line(format_args!("  counted: {}", counted.join(", ")));
 }

@@ -35,7 +35,10 @@ impl Join {
             Some(config) => format!("those that {} connects to", config.display()),
             None => self.connect.clone(),
         };
-        Failure::Unreachable(format!("{whom} does not answer within {:?}; is a node running there?", super::JOIN_WITHIN))
+        Failure::Unreachable(format!(
+            "{whom} does not answer within {:?}; is a node running there?",
+            super::JOIN_WITHIN
+        ))
     }
 
     fn load(&self) -> Result<Config, Failure> {
@@ -46,7 +49,8 @@ impl Join {
             "name = \"command-line\"\nfleet = {:?}\nentities = [{}]\n[bus]\nmode = \"client\"\nconnect = [{:?}]\n",
             self.fleet, self.entity, self.connect
         );
-        Config::parse("command line", &text).map_err(|e| Failure::Usage(format!("{} ({})", e.message(), e.cure())))
+        Config::parse("command line", &text)
+            .map_err(|e| Failure::Usage(format!("{} ({})", e.message(), e.cure())))
     }
 }
 
@@ -98,11 +102,17 @@ pub(crate) struct Member {
 
 impl Member {
     /// Joins the fleet with a desk.
-    pub(crate) fn join<D: Desk + 'static>(join: &Join, prefixes: Vec<Prefix>, desk: D) -> Result<Self, Failure> {
+    pub(crate) fn join<D: Desk + 'static>(
+        join: &Join,
+        prefixes: Vec<Prefix>,
+        desk: D,
+    ) -> Result<Self, Failure> {
         let config = join.load()?;
-        let outside = runtime::outside(&config).map_err(|why: bus::BusError| Failure::Usage(why.to_string()))?;
+        let outside =
+            runtime::outside(&config).map_err(|why: bus::BusError| Failure::Usage(why.to_string()))?;
         let mut node = runtime::node_config(&config);
-        node.services = vec![desk_service(Source::new(config.entities.own(), free_service()), prefixes, desk)];
+        node.services =
+            vec![desk_service(Source::new(config.entities.own(), free_service()), prefixes, desk)];
         node.bridges.clear();
         Self::start(node, outside)
     }

@@ -106,7 +106,8 @@ impl Publish {
             done,
         };
         let member = Member::join(&self.join, Vec::new(), publisher)?;
-        let patience = super::JOIN_WITHIN + period.saturating_mul(u32::try_from(self.count).unwrap_or(u32::MAX));
+        let patience =
+            super::JOIN_WITHIN + period.saturating_mul(u32::try_from(self.count).unwrap_or(u32::MAX));
         let published = is_done.recv_timeout(patience).map_err(|_| self.join.unreachable());
         member.leave()?;
         published?;
@@ -246,9 +247,13 @@ fn envelope_json(envelope: &Envelope) -> Value {
 /// A content for people and machines: read where its type is known, otherwise its bytes in hexadecimal.
 pub(super) fn content_text(label: &Label, content: &[u8]) -> Value {
     let read = match (label.descriptor(), &label.attributes.content_type) {
-        (HealthReport::NAME, ContentType::Umaa) => umaa::decode::<HealthReport>(content).ok().map(|r| umaa_text(&r)),
+        (HealthReport::NAME, ContentType::Umaa) => {
+            umaa::decode::<HealthReport>(content).ok().map(|r| umaa_text(&r))
+        }
         (LogReport::NAME, ContentType::Umaa) => umaa::decode::<LogReport>(content).ok().map(|r| log_text(&r)),
-        (aldis::NODE_STATUS, ContentType::Aldis) => aldis::decode::<aldis::NodeStatus>(content).map(|s| status_text(&s)),
+        (aldis::NODE_STATUS, ContentType::Aldis) => {
+            aldis::decode::<aldis::NodeStatus>(content).map(|s| status_text(&s))
+        }
         _ => None,
     };
     read.unwrap_or_else(|| json!({ "bytes": content.len(), "hex": hex(content) }))

@@ -23,10 +23,16 @@ impl Run {
         let config = Config::load(&self.config)?;
         let outside = runtime::outside(&config).map_err(|why| Failure::Usage(why.to_string()))?;
         telemetry::start(&config.log);
-        tracing::info!("{}: entity {} of fleet {}", config.name.as_str(), config.entities.own(), config.fleet);
+        tracing::info!(
+            "{}: entity {} of fleet {}",
+            config.name.as_str(),
+            config.entities.own(),
+            config.fleet
+        );
         let (control, controlled) = mpsc::unbounded_channel();
         watch_signals(control)?;
-        runtime::run(runtime::node_config(&config), outside, controlled).map_err(|why| Failure::Failed(why.to_string()))
+        runtime::run(runtime::node_config(&config), outside, controlled)
+            .map_err(|why| Failure::Failed(why.to_string()))
     }
 }
 

@@ -1,13 +1,13 @@
 //! Keeps a session on the bus, and hands what comes from it to the node.
 
 use super::Shared;
+use crate::bus::Congestion;
 use crate::bus::{Bus, BusError, Inbox};
 use aldis_envelope::Keys;
 use aldis_services::Event;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::watch;
-use crate::bus::Congestion;
 
 /// The first wait before a session is opened again, doubled each time.
 const RETRY_MIN: Duration = Duration::from_millis(200);
@@ -36,8 +36,9 @@ pub(super) async fn keep(
     let mut exited = core.lock().exited();
     let mut wait = RETRY_MIN;
     while !*exited.borrow() {
-        if silenced.wait_for(|silenced| !*silenced).await.is_err() {
-            break;
+        tokio::select! {
+            Ok(_) = silenced.wait_for(|silenced| !*silenced) => {}
+            _ = exited.wait_for(|exited| *exited) => break,
         }
         let opening = Bus::open(joining.config.clone(), keys.clone(), joining.congestion, inbox.clone());
         let opened = tokio::select! {
@@ -57,7 +58,7 @@ pub(super) async fn keep(
             }
         }
         tokio::select! {
-            _ = silenced.wait_for(|silenced| *silenced) => {
+            Ok(_) = silenced.wait_for(|silenced| *silenced) => {
                 core.lock().handle(&mut vec![Event::BusClosed("silenced".into())]);
             }
             _ = exited.wait_for(|exited| *exited) => {}

@@ -146,7 +146,9 @@ fn carry_out_on_bus(bus: &mut Bus, effect: Effect) -> Result<(), BusError> {
         Effect::Publish(publisher, envelope) => bus.publish(publisher, envelope),
         Effect::PublishOn(key, envelope) => bus.publish_on(key, envelope),
         Effect::Subscribe(expressions) => bus.subscribe(expressions),
-        Effect::Declare { publisher, key, constant, priority } => bus.declare(publisher, key, constant, priority),
+        Effect::Declare { publisher, key, constant, priority } => {
+            bus.declare(publisher, key, constant, priority)
+        }
         Effect::Token(source, shown) => bus.token(source, shown),
         _ => Ok(()),
     }

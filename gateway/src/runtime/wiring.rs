@@ -4,11 +4,9 @@ use super::bus_task::Joining;
 use crate::bridge::uxas_tcp::{Endpoint, Side};
 use crate::bus::Congestion;
 use crate::clock;
-use crate::config::{self, Called, Callers, Config, bus};
+use crate::config::{self, Config, bus};
 use aldis_envelope::{EntityId, GuidForm, Guids, Source};
-use aldis_services::allow::AllowRule;
 use aldis_services::registry::{self, Kind};
-use aldis_services::track::TrackConfig;
 use aldis_services::{BridgeSpec, NodeConfig, ServiceSpec};
 
 /// What the shell opens for a node.
@@ -48,7 +46,7 @@ pub(crate) fn node_config(config: &Config) -> NodeConfig {
         entities: config.entities.iter().collect(),
         boot: clock::boot_id(),
         operators: config.operators.iter().collect(),
-        allow: config.allow.iter().map(allow_rule).collect(),
+        allow: config.allow.iter().map(config::Allow::rule).collect(),
         import: config.routing.import.clone(),
         export: config.routing.export.clone(),
         services,
@@ -58,17 +56,7 @@ pub(crate) fn node_config(config: &Config) -> NodeConfig {
 
 fn configured(own: EntityId, service: &config::Service, guids: &Guids) -> ServiceSpec {
     let config::Service::Track(track) = service;
-    let entity = track.entity.unwrap_or(own);
-    let kind = Kind::Track(TrackConfig {
-        entity,
-        latitude_deg: track.latitude_deg,
-        longitude_deg: track.longitude_deg,
-        heading_deg: 0.0,
-        speed_m_per_s: track.speed_m_per_s,
-        turn_rate_deg_per_s: track.turn_rate_deg_per_s,
-        rate_hz: track.rate_hz,
-    });
-    registry::service(Source::new(entity, track.service), "track", kind, guids)
+    registry::service(track.source(own), "track", Kind::Track(track.motion(own)), guids)
 }
 
 fn bridge_spec(own: EntityId, bridge: &config::Bridge) -> BridgeSpec {
@@ -81,19 +69,5 @@ fn bridge_spec(own: EntityId, bridge: &config::Bridge) -> BridgeSpec {
         export: tcp.export.clone(),
         queue_messages_max: tcp.queue_messages_max as usize,
         stall_timeout: tcp.stall_timeout(),
-    }
-}
-
-fn allow_rule(rule: &config::Allow) -> AllowRule {
-    AllowRule {
-        from: match &rule.from {
-            Callers::Any => None,
-            Callers::Only(entities) => Some(entities.clone()),
-        },
-        service: match &rule.service {
-            Called::Any => None,
-            Called::Only(service) => Some(*service),
-        },
-        requests: rule.requests.iter().map(|prefix| prefix.as_str().to_owned()).collect(),
     }
 }

@@ -9,7 +9,9 @@ use std::sync::Arc;
 impl Node {
     pub(super) fn status(&self, now: Now) -> NodeStatus {
         let uptime = self.started.map(|started| now.monotonic - started).unwrap_or_default();
-        let services = self.services.iter().map(|hosted| ServiceStatus {
+        let is_bridge = |source| self.bridges.iter().any(|bridge| bridge.spec.source == source);
+        let services = self.services.iter().filter(|hosted| !is_bridge(hosted.spec.source));
+        let services = services.map(|hosted| ServiceStatus {
             source: hosted.spec.source,
             name: hosted.spec.name.clone(),
             state: hosted.state().to_owned(),

@@ -155,7 +155,12 @@ impl Node {
         }
     }
 
-    pub(super) fn tell_followers(&mut self, now: Now, input: impl Fn() -> Input<'static>, effects: &mut Vec<Effect>) {
+    pub(super) fn tell_followers(
+        &mut self,
+        now: Now,
+        input: impl Fn() -> Input<'static>,
+        effects: &mut Vec<Effect>,
+    ) {
         for place in 0..self.services.len() {
             if self.services[place].follows_bus() {
                 self.run(now, place, input(), effects);

@@ -134,7 +134,8 @@ pub(super) async fn run(
         core.handle(&mut vec![Event::Peer(bridge, id, PeerEvent::Up(from.to_string(), CREDIT))]);
         id
     };
-    let mut reading = Reading { core: core.clone(), bridge, id, reader: Reader::new(message_bytes_max), paused };
+    let mut reading =
+        Reading { core: core.clone(), bridge, id, reader: Reader::new(message_bytes_max), paused };
     let why = tokio::select! {
         why = reading.run(&stream) => why,
         why = writing(&core, bridge, id, &stream, &blocked) => why,
@@ -145,7 +146,13 @@ pub(super) async fn run(
 }
 
 /// Waits, whenever writing was blocked, until it is not.
-async fn writing(core: &Shared, bridge: BridgeId, id: PeerId, stream: &TcpStream, blocked: &Notify) -> String {
+async fn writing(
+    core: &Shared,
+    bridge: BridgeId,
+    id: PeerId,
+    stream: &TcpStream,
+    blocked: &Notify,
+) -> String {
     loop {
         blocked.notified().await;
         if let Err(why) = stream.writable().await {
@@ -186,7 +193,8 @@ impl Reading {
                 Err(why) => return why.to_string(),
             }
             self.take_items(&mut events);
-            if events.is_empty() && progress.elapsed() >= UNFINISHED_AFTER && self.reader.is_inside_a_frame() {
+            if events.is_empty() && progress.elapsed() >= UNFINISHED_AFTER && self.reader.is_inside_a_frame()
+            {
                 events.extend(self.reader.abandon_unfinished().map(|item| self.event(item)));
                 self.take_items(&mut events);
                 progress = Instant::now();
