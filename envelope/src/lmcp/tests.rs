@@ -2,6 +2,7 @@
 
 mod golden;
 mod hostile;
+mod json;
 mod model;
 mod roundtrip;
 mod xml;
