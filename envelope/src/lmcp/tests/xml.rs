@@ -125,6 +125,7 @@ fn a_document_that_is_not_well_formed_tells_the_line() {
     assert_eq!(fault(b"<a/>\n\n<b/>"), (3, XmlFault::Junk));
     assert_eq!(fault(b"<a/>\n\nb"), (3, XmlFault::Junk));
     assert_eq!(fault(b"\n<!-- a\n<!-- b --><a/>"), (3, XmlFault::Comment));
+    assert_eq!(fault(b"<!-- a\n---><a/>"), (2, XmlFault::Comment));
     assert_eq!(fault(b"<a>\n&b;</a>"), (2, XmlFault::Entity("b".into())));
     assert_eq!(fault(b"<a>\n\xff</a>"), (2, XmlFault::Encoding));
     assert_eq!(fault(b"\n"), (2, XmlFault::NoRoot));
