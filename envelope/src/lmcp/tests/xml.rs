@@ -148,8 +148,8 @@ fn texts_come_back_with_blanks_and_markup() {
 #[test]
 fn blanks_around_a_text_are_no_part_of_it() {
     let request = read_one(
-        "<AutomationRequest Series='CMASI'><TaskRelationships>\n  p(1 <!-- or --> 2)&#32;\n</TaskRelationships>\
-         </AutomationRequest>",
+        "<AutomationRequest Series='CMASI'><TaskRelationships>\n  p(1 <!-- or --> 2)&#32;\n\
+         </TaskRelationships></AutomationRequest>",
     );
     let request: &AutomationRequest = request.get().unwrap();
     assert_eq!(request.task_relationships, "p(1  2) ");
