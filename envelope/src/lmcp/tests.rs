@@ -9,6 +9,7 @@ mod xml;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 /// A folder of the reference's data, which lies beside the project and is no part of it: tests that
 /// need it pass without, and say so.
@@ -42,9 +43,11 @@ fn read(path: &Path) -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 
-/// One message of each type, every field set, from the reference.
-fn golden_messages() -> Vec<Vec<u8>> {
-    shared("lmcp")
-        .map(|folder| files(&folder, "lmcp").iter().map(|path| read(path)).collect())
-        .unwrap_or_default()
+/// One message of each type, every field set, from the reference; none when it is not there.
+fn golden_messages() -> &'static [Vec<u8>] {
+    static MESSAGES: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
+        let paths = shared("lmcp").map(|folder| files(&folder, "lmcp")).unwrap_or_default();
+        paths.iter().map(|path| read(path)).collect()
+    });
+    &MESSAGES
 }

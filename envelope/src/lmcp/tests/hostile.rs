@@ -77,7 +77,7 @@ proptest! {
     ) {
         let messages = golden_messages();
         if !messages.is_empty() {
-            let mut message = pick.get(&messages).clone();
+            let mut message = pick.get(messages).clone();
             for (place, value) in wrongs {
                 let place = place.index(message.len());
                 message[place] = value;

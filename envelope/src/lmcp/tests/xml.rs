@@ -81,9 +81,9 @@ fn a_recorded_mission_is_read_stably() {
 #[test]
 fn every_type_goes_through_xml() {
     for message in golden_messages() {
-        let object = decode(&message).unwrap();
+        let object = decode(message).unwrap();
         let again = read_one(&to_xml(object.as_ref()).unwrap());
-        assert_eq!(encode(again.as_ref()).unwrap(), message);
+        assert_eq!(encode(again.as_ref()).unwrap(), *message);
     }
 }
 
