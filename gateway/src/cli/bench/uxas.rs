@@ -41,8 +41,10 @@ impl Configured {
             "name = \"bench-{entity}\"\nfleet = \"bench\"\nentities = [{entity}]\n[bus]\n{bus}\n[log]\nlevel = \"warn\"\n\
              [[bridge]]\nkind = \"uxas-tcp\"\nname = \"uxas\"\nservice = 20\nlisten = \"127.0.0.1:{port}\"\n"
         );
-        let path = std::env::temp_dir().join(format!("aldis-bench-{}-{entity}-{port}.toml", std::process::id()));
-        std::fs::write(&path, text).map_err(|why| Failure::Failed(format!("cannot write {}: {why}", path.display())))?;
+        let path =
+            std::env::temp_dir().join(format!("aldis-bench-{}-{entity}-{port}.toml", std::process::id()));
+        std::fs::write(&path, text)
+            .map_err(|why| Failure::Failed(format!("cannot write {}: {why}", path.display())))?;
         Ok(Self(path))
     }
 
@@ -103,10 +105,19 @@ impl UxasBench {
         Ok(figures)
     }
 
-    fn round(&self, side: &mut Pair, frames: &Frames, counts: bool, figures: &mut Figures) -> Result<(), Failure> {
+    fn round(
+        &self,
+        side: &mut Pair,
+        frames: &Frames,
+        counts: bool,
+        figures: &mut Figures,
+    ) -> Result<(), Failure> {
         // The first round warms up and does not count.
-        let (messages, trips) =
-            if counts { (self.messages, self.round_trips) } else { (self.messages / 10, self.round_trips / 10) };
+        let (messages, trips) = if counts {
+            (self.messages, self.round_trips)
+        } else {
+            (self.messages / 10, self.round_trips / 10)
+        };
         let (took, seen) = side.load(frames, messages)?;
         let mut trips = side.round_trips(frames, trips)?;
         figures.lost += messages.saturating_sub(seen);
@@ -121,8 +132,16 @@ impl UxasBench {
     /// Two nodes with Zenoh between them.
     fn relay(&self, frames: &Frames) -> Result<Figures, Failure> {
         let (near_port, far_port, bus_port) = (free_port()?, free_port()?, free_port()?);
-        let far = Configured::new(1, &format!("mode = \"router\"\nlisten = [\"tcp/127.0.0.1:{bus_port}\"]"), far_port)?;
-        let near = Configured::new(400, &format!("mode = \"client\"\nconnect = [\"tcp/127.0.0.1:{bus_port}\"]"), near_port)?;
+        let far = Configured::new(
+            1,
+            &format!("mode = \"router\"\nlisten = [\"tcp/127.0.0.1:{bus_port}\"]"),
+            far_port,
+        )?;
+        let near = Configured::new(
+            400,
+            &format!("mode = \"client\"\nconnect = [\"tcp/127.0.0.1:{bus_port}\"]"),
+            near_port,
+        )?;
         let (_far, _near) = (far.start()?, near.start()?);
         let mut pair = Pair::connect(near_port, far_port, frames)?;
         let mut figures = Figures::default();

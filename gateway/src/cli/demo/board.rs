@@ -52,7 +52,8 @@ impl Board {
     /// The result, from what shore saw and what the nodes counted.
     pub(super) fn result(&self, statuses: &[NodeStatus], ran: Duration) -> Outcome {
         let counted = |name: &str| {
-            let of = |status: &NodeStatus| status.counters.iter().find(|(n, _)| n == name).map_or(0, |(_, v)| *v);
+            let of =
+                |status: &NodeStatus| status.counters.iter().find(|(n, _)| n == name).map_or(0, |(_, v)| *v);
             statuses.iter().map(of).sum()
         };
         Outcome {

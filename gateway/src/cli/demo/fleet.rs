@@ -35,7 +35,10 @@ fn failed<E: std::fmt::Display>(why: E) -> Failure {
 impl Fleet {
     /// Starts shore, then the boats.
     pub(super) fn start(board: &Arc<Mutex<Board>>) -> Result<Self, Failure> {
-        let port = TcpListener::bind("127.0.0.1:0").and_then(|listener| listener.local_addr()).map_err(failed)?.port();
+        let port = TcpListener::bind("127.0.0.1:0")
+            .and_then(|listener| listener.local_addr())
+            .map_err(failed)?
+            .port();
         let (tell, statuses) = mpsc::channel();
         let finish = Arc::new(AtomicBool::new(false));
         let boats = BOATS.map(EntityId::new).into_iter().collect::<Result<Vec<_>, _>>().map_err(failed)?;
@@ -46,7 +49,8 @@ impl Fleet {
         let prefixes = prefixes.into_iter().collect::<Result<Vec<_>, _>>().map_err(failed)?;
         let desk = desk_service(source, prefixes, desk);
         let shore = start(&shore_text(port), Some(desk))?;
-        let boats = BOATS.iter().map(|&boat| start(&boat_text(boat, port), None)).collect::<Result<_, _>>()?;
+        let boats =
+            BOATS.iter().map(|&boat| start(&boat_text(boat, port), None)).collect::<Result<_, _>>()?;
         Ok(Self { shore, boats, finish, statuses })
     }
 
@@ -62,7 +66,9 @@ impl Fleet {
     /// What every node says of itself at the end.
     pub(super) fn statuses(&self, within: Duration) -> Result<Vec<NodeStatus>, Failure> {
         self.finish.store(true, Ordering::Relaxed);
-        self.statuses.recv_timeout(within).map_err(|_| Failure::Failed("the nodes do not tell their status".into()))
+        self.statuses
+            .recv_timeout(within)
+            .map_err(|_| Failure::Failed("the nodes do not tell their status".into()))
     }
 
     /// Ends all nodes, the boats first.

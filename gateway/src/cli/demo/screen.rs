@@ -12,8 +12,15 @@ const SILENT_AFTER: Duration = Duration::from_millis(500);
 pub(super) fn draw(board: &mut Board, ran: Duration) {
     let mut text = String::from("\x1b[H\x1b[2J");
     // Writing to a String cannot fail.
-    let _ = writeln!(text, "Aldis demo: shore (entity 1) hears three boats, {} s. Ctrl-C ends it.\n", ran.as_secs());
-    let _ = writeln!(text, "boat  heard     age ms   rate/s  position              health  calls ok/failed  round trip");
+    let _ = writeln!(
+        text,
+        "Aldis demo: shore (entity 1) hears three boats, {} s. Ctrl-C ends it.\n",
+        ran.as_secs()
+    );
+    let _ = writeln!(
+        text,
+        "boat  heard     age ms   rate/s  position              health  calls ok/failed  round trip"
+    );
     let now = board.now;
     for (entity, boat) in &mut board.boats {
         let age = boat.heard.map(|heard| now - heard).unwrap_or_default();
@@ -27,7 +34,8 @@ pub(super) fn draw(board: &mut Board, ran: Duration) {
         let position = format!("{:.5} {:.5}", boat.latitude, boat.longitude);
         let health = boat.worst.map_or("?".to_owned(), |worst| format!("{worst:?}"));
         let calls = format!("{}/{}", boat.calls_ok, boat.calls_failed);
-        let trip = boat.round_trip.map_or(String::new(), |trip| format!("{:.1} ms", trip.as_secs_f64() * 1e3));
+        let trip =
+            boat.round_trip.map_or(String::new(), |trip| format!("{:.1} ms", trip.as_secs_f64() * 1e3));
         let _ = writeln!(
             text,
             "{entity:<5} {heard:<9} {:>6} {:>8.1}  {position:<21} {health:<7} {calls:<16} {trip}",
@@ -39,7 +47,10 @@ pub(super) fn draw(board: &mut Board, ran: Duration) {
         }
     }
     if let Some(silenced) = board.silenced {
-        let _ = writeln!(text, "\nboat {silenced} is silenced: it keeps moving, and its next word will tell what was left out");
+        let _ = writeln!(
+            text,
+            "\nboat {silenced} is silenced: it keeps moving, and its next word will tell what was left out"
+        );
     }
     print_line(text);
 }

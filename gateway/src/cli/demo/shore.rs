@@ -6,8 +6,8 @@ use crate::cli::member::Desk;
 use aldis_envelope::aldis::{self, NodeStatus};
 use aldis_envelope::umaa::{self, ErrorCondition, HealthReport};
 use aldis_envelope::{
-    Address, CallId, Change, ContentType, Descriptor, EntityId, Envelope, Guid, Monotonic, Now, Refusal, ServiceId, Source,
-    lmcp,
+    Address, CallId, Change, ContentType, Descriptor, EntityId, Envelope, Guid, Monotonic, Now, Refusal,
+    ServiceId, Source, lmcp,
 };
 use aldis_services::{Input, Outbox, track};
 use bytes::Bytes;
@@ -122,7 +122,8 @@ impl ShoreDesk {
             && let Ok(report) = umaa::decode::<HealthReport>(&message.content)
         {
             self.health.insert((entity, report.resource_id), report.severity);
-            let worst = worst(self.health.range((entity, Guid::default())..).take_while(|((e, _), _)| *e == entity));
+            let worst =
+                worst(self.health.range((entity, Guid::default())..).take_while(|((e, _), _)| *e == entity));
             if let Some(boat) = self.board().boats.get_mut(&entity) {
                 boat.reports += 1;
                 boat.worst = worst;
@@ -164,7 +165,9 @@ fn call(entity: EntityId, request: &str, out: &mut Outbox) -> Option<CallId> {
 }
 
 /// The worst of some conditions. Their numbers on the wire are alphabetical, not by badness.
-fn worst<'a>(reports: impl Iterator<Item = (&'a (EntityId, Guid), &'a ErrorCondition)>) -> Option<ErrorCondition> {
+fn worst<'a>(
+    reports: impl Iterator<Item = (&'a (EntityId, Guid), &'a ErrorCondition)>,
+) -> Option<ErrorCondition> {
     let badness = |condition: &ErrorCondition| match condition {
         ErrorCondition::None => 0,
         ErrorCondition::Info => 1,

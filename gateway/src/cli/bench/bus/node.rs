@@ -4,7 +4,9 @@ use super::{BusBench, LAST, PATIENCE, Side, configuration, content, ended};
 use crate::cli::exit::Failure;
 use crate::cli::member::{Desk, Member, desk_service};
 use crate::runtime;
-use aldis_envelope::{ContentType, EntityId, Label, Message, Monotonic, Name, Now, Prefix, ServiceId, Source};
+use aldis_envelope::{
+    ContentType, EntityId, Label, Message, Monotonic, Name, Now, Prefix, ServiceId, Source,
+};
 use aldis_services::{Input, Outbox};
 use bytes::Bytes;
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
@@ -62,7 +64,9 @@ impl Desk for SenderDesk {
         match input {
             Input::Started => self.next = Some(now.monotonic + LOOK_EVERY),
             Input::Deadline => self.work(now, out),
-            Input::Message(envelope) if envelope.message.label.descriptor() == "bench.to.1.Pong" => self.pong(now, out),
+            Input::Message(envelope) if envelope.message.label.descriptor() == "bench.to.1.Pong" => {
+                self.pong(now, out)
+            }
             Input::Message(envelope) => {
                 let seen = envelope.message.content.as_ref().try_into().map(u64::from_le_bytes);
                 let _ = self.tell.send(Told::Done(seen.unwrap_or_default()));
@@ -209,7 +213,11 @@ impl Desk for SinkDesk {
 
 /// The far side, until it is killed.
 pub(super) fn serve(connect: &str) -> Result<(), Failure> {
-    let desk = SinkDesk { done: label("bench.to.1.Done", source(2)?)?, pong: label("bench.to.1.Pong", source(2)?)?, seen: 0 };
+    let desk = SinkDesk {
+        done: label("bench.to.1.Done", source(2)?)?,
+        pong: label("bench.to.1.Pong", source(2)?)?,
+        seen: 0,
+    };
     let _member = member(2, &format!("connect = [\"{connect}\"]"), "bench.to.2", desk)?;
     BusBench::serve_until_killed()
 }

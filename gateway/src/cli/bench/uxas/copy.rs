@@ -42,7 +42,8 @@ async fn copy(stream: TcpStream, id: u64, writers: Writers) {
     writers.borrow_mut().insert(id, Rc::new(tokio::sync::Mutex::new(writer)));
     let mut buffer = vec![0; 64 * 1024];
     while let Ok(count @ 1..) = reader.read(&mut buffer).await {
-        let others: Vec<_> = writers.borrow().iter().filter(|(to, _)| **to != id).map(|(_, w)| w.clone()).collect();
+        let others: Vec<_> =
+            writers.borrow().iter().filter(|(to, _)| **to != id).map(|(_, w)| w.clone()).collect();
         for other in others {
             if other.lock().await.write_all(&buffer[..count]).await.is_err() {
                 break;

@@ -68,7 +68,8 @@ fn state() -> Result<Vec<u8>, Failure> {
     let with_info = |length: usize| {
         let mut state = cmasi::AirVehicleState::default();
         state.id = 400;
-        state.location = Ref::new(cmasi::Location3D { latitude: 45.3, longitude: -120.9, ..Default::default() });
+        state.location =
+            Ref::new(cmasi::Location3D { latitude: 45.3, longitude: -120.9, ..Default::default() });
         state.info = vec![Ref::new(cmasi::KeyValuePair { key: "fill".into(), value: "x".repeat(length) })];
         lmcp::encode(&state).map_err(failed("the message"))
     };
