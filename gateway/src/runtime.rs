@@ -2,6 +2,7 @@
 
 mod bus_task;
 mod core;
+mod disk;
 mod wiring;
 
 pub(crate) use core::{Core, Shared};
@@ -82,6 +83,7 @@ async fn drive(
     let inbox = Arc::new(crate::bus::Inbox::new(keys.clone()));
     let mut tasks = tokio::task::JoinSet::new();
     tasks.spawn_local(deadlines(core.clone(), timer));
+    tasks.spawn_local(disk::watch(core.clone()));
     tasks.spawn_local(job_results(core.clone(), jobs));
     tasks.spawn_local(bus_task::drain(core.clone(), inbox.clone(), paused.clone()));
     for (i, endpoint) in outside.bridges.into_iter().enumerate() {
