@@ -51,6 +51,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let content = envelope.message.content.clone();
     let read = Decoder::new(keys).decode(&key, false, &header, content)?;
     assert_eq!(read, envelope);
-    writeln!(out, "read    {} from {}, sequence {}", label.descriptor(), label.source(), read.stamp.sequence)?;
+    writeln!(
+        out,
+        "read    {} from {}, sequence {}",
+        label.descriptor(),
+        label.source(),
+        read.stamp.sequence
+    )?;
     Ok(())
 }
