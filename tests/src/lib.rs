@@ -1,1 +1,3 @@
-//! Tests.
+//! What whole-system tests share.
+
+pub mod python;
