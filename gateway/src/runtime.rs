@@ -13,7 +13,7 @@ use aldis_services::event::BridgeId;
 use aldis_services::{Event, Node, NodeConfig};
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{Notify, mpsc, watch};
 use tokio::task::LocalSet;
 
 /// How long the orderly end of a node may take before it is cut off.
@@ -68,6 +68,7 @@ pub(crate) struct Ends {
     pub(crate) paused: watch::Receiver<bool>,
     pub(crate) exited: watch::Receiver<bool>,
     pub(crate) jobs: mpsc::UnboundedReceiver<Event>,
+    pub(crate) wake: Arc<Notify>,
 }
 
 async fn drive(
@@ -77,13 +78,14 @@ async fn drive(
     keys: aldis_envelope::Keys,
     control: mpsc::UnboundedReceiver<Control>,
 ) {
-    let Ends { timer, paused, mut exited, jobs } = ends;
+    let Ends { timer, paused, mut exited, jobs, wake } = ends;
     core.lock().handle(&mut Vec::new());
     let (silence, silenced) = watch::channel(false);
-    let inbox = Arc::new(crate::bus::Inbox::new(keys.clone()));
+    let inbox = Arc::new(crate::bus::Inbox::new(keys.clone(), direct(core.clone())));
     let mut tasks = tokio::task::JoinSet::new();
     tasks.spawn_local(deadlines(core.clone(), timer));
     tasks.spawn_local(disk::watch(core.clone()));
+    tasks.spawn_local(deferred(core.clone(), wake));
     tasks.spawn_local(job_results(core.clone(), jobs));
     tasks.spawn_local(bus_task::drain(core.clone(), inbox.clone(), paused.clone()));
     for (i, endpoint) in outside.bridges.into_iter().enumerate() {
@@ -101,6 +103,21 @@ async fn drive(
     tasks.shutdown().await;
 }
 
+/// The way of an event to an idle node, on the thread that has it.
+fn direct(core: Shared) -> crate::bus::Direct {
+    Box::new(move |event| match core.try_lock() {
+        Some(mut core) => core.handle_on_callback(event),
+        None => Err(event),
+    })
+}
+
+async fn deferred(core: Shared, wake: Arc<Notify>) {
+    loop {
+        wake.notified().await;
+        core.lock().handle(&mut Vec::new());
+    }
+}
+
 async fn deadlines(core: Shared, mut timer: watch::Receiver<Option<aldis_envelope::Monotonic>>) {
     loop {
         let Some(at) = *timer.borrow_and_update() else {
@@ -110,19 +127,27 @@ async fn deadlines(core: Shared, mut timer: watch::Receiver<Option<aldis_envelop
             continue;
         };
         let at = core.lock().clock().instant(at);
+        if at <= std::time::Instant::now() {
+            // Tokio's timers are a millisecond late, which is long for what is due now.
+            tokio::task::yield_now().await;
+            deadline(&core);
+            continue;
+        }
         tokio::select! {
             changed = timer.changed() => {
                 if changed.is_err() {
                     return;
                 }
             }
-            () = tokio::time::sleep_until(at.into()) => {
-                let mut core = core.lock();
-                core.disarm();
-                core.handle(&mut vec![Event::Deadline]);
-            }
+            () = tokio::time::sleep_until(at.into()) => deadline(&core),
         }
     }
+}
+
+fn deadline(core: &Shared) {
+    let mut core = core.lock();
+    core.disarm();
+    core.handle(&mut vec![Event::Deadline]);
 }
 
 async fn job_results(core: Shared, mut jobs: mpsc::UnboundedReceiver<Event>) {

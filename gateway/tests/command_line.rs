@@ -26,7 +26,9 @@ fn help_teaches_by_example_and_tells_the_exit_codes() {
 fn every_configuration_is_good() {
     let mut args = vec!["check".to_owned(), "--json".to_owned()];
     let configs = std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../configs")).unwrap();
-    args.extend(configs.map(|file| file.unwrap().path().display().to_string()).filter(|path| path.ends_with(".toml")));
+    args.extend(
+        configs.map(|file| file.unwrap().path().display().to_string()).filter(|path| path.ends_with(".toml")),
+    );
     let count = args.len() - 2;
     let checked = aldis(&args.iter().map(String::as_str).collect::<Vec<_>>());
     assert!(checked.status.success(), "{}", stdout(&checked));
@@ -45,7 +47,12 @@ fn schema_and_access_control_are_json() {
 
 #[test]
 fn wrong_usage_starts_nothing() {
-    for args in [&["call", "eid4x", "--ping"][..], &["nonsense"], &["call", "eid4"], &["call", "a", "--ping", "--within", "2"]] {
+    for args in [
+        &["call", "eid4x", "--ping"][..],
+        &["nonsense"],
+        &["call", "eid4"],
+        &["call", "a", "--ping", "--within", "2"],
+    ] {
         let output = aldis(args);
         assert_eq!(output.status.code(), Some(2), "{args:?}");
         assert!(!output.stderr.is_empty());
