@@ -65,7 +65,8 @@ impl Survey {
 impl Desk for Survey {
     fn take(&mut self, _: Now, input: Input<'_>, out: &mut Outbox) {
         match input {
-            Input::Token(source, true) => {
+            // Itself is not who it looks for.
+            Input::Token(source, true) if source != out.source() => {
                 self.seen.alive.entry(source.entity).or_default().insert(source.service);
             }
             Input::Bus(true) => self.ask_all(out),

@@ -107,10 +107,16 @@ fn links(bus: &Bus) -> Settings {
 
 /// Off unless asked for: who is joined stands in the configuration. Multicast finds the first, gossip the others.
 fn scouting(scouting: Scouting) -> Settings {
-    vec![
+    let mut settings = vec![
         ("scouting/multicast/enabled", json!(scouting == Scouting::Multicast)),
         ("scouting/gossip/enabled", json!(scouting != Scouting::None)),
-    ]
+    ];
+    if scouting == Scouting::None {
+        // A router waits so long for those whom it may find before it is open, and hears nothing of what it already
+        // passes on between others.
+        settings.push(("scouting/delay", json!(0)));
+    }
+    settings
 }
 
 /// What Aldis does itself or does not offer. The queues stay as Zenoh has them: congestion control is a property of
