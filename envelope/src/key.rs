@@ -255,7 +255,15 @@ fn address_chunks(address: &Address, key: &mut String) {
 pub(crate) fn address_from_chunks(chunks: &str, spelling: &Spelling) -> Result<Address, String> {
     if looks_like_an_id(chunks) {
         let text = chunks.replacen('/', ".", 1);
-        return Address::new(&text).map_err(|e: NameError| e.to_string());
+        let address = Address::new(&text).map_err(|e: NameError| e.to_string())?;
+        let mut again = String::with_capacity(chunks.len());
+        address_chunks(&address, &mut again);
+        // On a key of its own spelling a message would pass by those who subscribed to the id.
+        return if again == chunks {
+            Ok(address)
+        } else {
+            Err(format!("the chunks `{chunks}` are not those of `{address}`"))
+        };
     }
     let text = unescape(chunks, spelling)?;
     Address::new(&text).map_err(|e| e.to_string())

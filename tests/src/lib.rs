@@ -11,6 +11,7 @@ mod node;
 mod peer;
 mod ports;
 mod project;
+pub mod python;
 mod site;
 mod wait;
 

@@ -96,6 +96,18 @@ fn foreign_keys_are_told_apart() {
     assert_eq!(keys.parse("aldis/blue/@alive/400/2").unwrap().source, source(400, 2));
 }
 
+#[test]
+fn an_id_stands_in_chunks_of_one_form() {
+    for chunks in
+        ["eid400sid37", "eid400.sid37", "eid400sidall", "eid400/sid37/x", "eid400/.sid37", "eid0400"]
+    {
+        assert!(address_from_chunks(chunks, &Spelling::Dots).is_err(), "{chunks}");
+    }
+    for chunks in ["eid400/sid37", "eid400/sidall", "eid400"] {
+        assert!(address_from_chunks(chunks, &Spelling::Dots).is_ok(), "{chunks}");
+    }
+}
+
 /// Texts that are hard on the escaping: many separators, halves of separators, wildcards and ids.
 fn hard_text() -> impl Strategy<Value = String> {
     let piece = prop_oneof![
