@@ -3,7 +3,7 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::mpsc;
+use std::sync::{Mutex, PoisonError, mpsc};
 use std::time::Duration;
 
 /// With this variable set to 1 an absent peer is a failure.
@@ -16,7 +16,7 @@ const STEP_WITHIN: Duration = Duration::from_secs(120);
 ///
 /// # Panics
 /// Where the program lies elsewhere.
-pub fn target_directory() -> PathBuf {
+fn target_directory() -> PathBuf {
     let program = std::env::current_exe().expect("the tests' own program has a path");
     program.ancestors().nth(3).expect("cargo builds tests three levels deep").to_owned()
 }
@@ -59,6 +59,9 @@ fn found_or_skipped(peer: &str, found: Result<PathBuf, String>) -> Option<PathBu
 /// Made under a name of its own and then renamed: of several tests that make it at once one wins, and none ever sees
 /// half of it.
 fn environment(packages: &[&str]) -> Result<PathBuf, String> {
+    // Of the tests in one process the others wait.
+    static MAKING: Mutex<()> = Mutex::new(());
+    let _making = MAKING.lock().unwrap_or_else(PoisonError::into_inner);
     let peers = target_directory().join("python");
     let place = peers.join(packages.join("+"));
     let python = |place: &Path| place.join("bin").join("python");
@@ -66,17 +69,22 @@ fn environment(packages: &[&str]) -> Result<PathBuf, String> {
         return Ok(python(&place));
     }
     std::fs::create_dir_all(&peers).map_err(|why| format!("cannot make {}: {why}", peers.display()))?;
-    let draft = tempfile::Builder::new().prefix("draft-").tempdir_in(&peers);
-    let draft = draft.map_err(|why| format!("no room for a draft: {why}"))?;
-    run("make a virtual environment", Command::new("python3").args(["-m", "venv"]).arg(draft.path()))?;
-    let mut install = Command::new(python(draft.path()));
-    install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-input"]);
-    install.args(["--only-binary", ":all:", "--timeout", "20", "--retries", "1"]).args(packages);
-    run("install it", &mut install)?;
-    match std::fs::rename(draft.path(), &place) {
+    let draft = peers.join(format!("draft-{}", std::process::id()));
+    let made = make(&draft, packages).and_then(|()| match std::fs::rename(&draft, &place) {
         Err(why) if !python(&place).exists() => Err(format!("cannot keep it: {why}")),
         _ => Ok(python(&place)),
-    }
+    });
+    // Where it has been kept, there is no draft any more.
+    let _ = std::fs::remove_dir_all(&draft);
+    made
+}
+
+fn make(draft: &Path, packages: &[&str]) -> Result<(), String> {
+    run("make a virtual environment", Command::new("python3").args(["-m", "venv"]).arg(draft))?;
+    let mut install = Command::new(draft.join("bin").join("python"));
+    install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-input"]);
+    install.args(["--only-binary", ":all:", "--timeout", "20", "--retries", "1"]).args(packages);
+    run("install it", &mut install)
 }
 
 /// Runs a command to its end, within [`STEP_WITHIN`].

@@ -5,7 +5,7 @@ mod vectors;
 
 use aldis_envelope::umaa::{self, HealthReport, Topic};
 use aldis_tests::python;
-use harness::{Node, Running};
+use harness::Fleet;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -24,8 +24,8 @@ fn unhex(text: &Value) -> Vec<u8> {
 #[test]
 fn python_reads_what_aldis_sends() {
     let Some(python) = zenoh() else { return };
-    let node = Node::start();
-    let sub = node.start_peer(&python, &["sub", HealthReport::NAME]);
+    let fleet = Fleet::start();
+    let sub = fleet.start_peer(&python, &["sub", HealthReport::NAME]);
     let mut statuses = BTreeSet::new();
     let mut last: Option<(u64, u64)> = None;
     while statuses.len() < 4 {
@@ -59,7 +59,7 @@ fn python_reads_what_aldis_sends() {
         assert_eq!(read["time_stamp"], aldis_envelope::Wall::from(report.time_stamp).0);
         statuses.insert(report.status.as_str().to_owned());
     }
-    node.process.terminate();
+    fleet.node.signal("TERM");
     let disposed = std::iter::from_fn(|| sub.next()).find(|heard| heard["change"] == "dispose");
     let disposed = disposed.expect("a node that ends in order disposes its reports");
     assert_eq!(unhex(&disposed["key"]).len(), 32);
@@ -69,9 +69,9 @@ fn python_reads_what_aldis_sends() {
 #[test]
 fn aldis_reads_what_python_sends() {
     let Some(python) = zenoh() else { return };
-    let node = Node::start();
-    let sub = node.start_aldis(&["sub", "interop.", "eid9000", "UMAA::.", "--json"]);
-    let cycle = node.start_foreign(&python, &["cycle"]);
+    let fleet = Fleet::start();
+    let sub = fleet.start_aldis(&["sub", "interop.", "eid9000", "UMAA::.", "--json"]);
+    let cycle = fleet.start_foreign(&python, &["cycle"]);
     let chunk = "0000012c000000000000000000000000";
     let topic = "interop.Topic";
     let mut expected = vec![
@@ -102,15 +102,15 @@ fn aldis_reads_what_python_sends() {
         assert!(all.contains(&form), "not to be received: {form}");
         expected.retain(|wanted| *wanted != form);
     }
-    cycle.end_input();
+    cycle.finish();
 }
 
 #[test]
 fn calls_pass_both_ways() {
     let Some(python) = zenoh() else { return };
-    let node = Node::start();
+    let fleet = Fleet::start();
     let ping = |to: &str| {
-        let peer = node.start_peer(&python, &["--as", "301", "ping", to, "--within", "10"]);
+        let peer = fleet.start_peer(&python, &["--as", "301", "ping", to, "--within", "10"]);
         std::iter::from_fn(|| peer.next()).collect::<Vec<_>>()
     };
     let answers = ping("eid400sid1");
@@ -118,29 +118,29 @@ fn calls_pass_both_ways() {
     assert_eq!(answers[1], json!({ "ok": true, "answers": 1 }));
     assert_eq!(ping("eid401sid1"), [json!({ "ok": false, "answers": 0 })]);
 
-    let service = node.start_peer(&python, &["--as", "300", "--service", "5", "serve"]);
+    let service = fleet.start_peer(&python, &["--as", "300", "--service", "5", "serve"]);
     assert_eq!(service.next(), Some(json!({ "serving": "eid300sid5" })));
     for to in ["eid300sid5", "eid300sidall", "eid300"] {
-        let answers = node.aldis_json(&["call", to, "--ping", "--json", "--within", "10s"]);
+        let answers = fleet.aldis(&["call", to, "--ping", "--json", "--within", "10s"]).json();
         assert_eq!([&answers[0]["from"], &answers[0]["descriptor"]], ["eid300sid5", "aldis.Pong"], "{to}");
         assert_eq!(answers[1]["answers"], 1);
     }
-    let fleet = node.aldis_json(&["fleet", "--json"]);
-    assert!(fleet.contains(&json!({ "node": 300, "services_alive": [5], "answers": false })), "{fleet:?}");
-    let refused = node.aldis(&["call", "eid300sid5", "--request", "interop.Unknown", "--within", "10s"]);
-    assert_eq!(refused.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("not understood: interop.Unknown"));
+    let seen = fleet.aldis(&["fleet", "--json"]).json();
+    assert!(seen.contains(&json!({ "node": 300, "services_alive": [5], "answers": false })), "{seen:?}");
+    let refused = fleet.aldis(&["call", "eid300sid5", "--request", "interop.Unknown", "--within", "10s"]);
+    assert_eq!(refused.code, Some(1));
+    assert!(refused.stderr.contains("not understood: interop.Unknown"));
 
-    Running::end_input(service);
-    let nobody = node.aldis(&["call", "eid300sid5", "--ping", "--within", "10s"]);
-    assert_eq!(nobody.status.code(), Some(3), "nobody is there, and that is told at once");
+    service.finish();
+    let nobody = fleet.aldis(&["call", "eid300sid5", "--ping", "--within", "10s"]);
+    assert_eq!(nobody.code, Some(3), "nobody is there, and that is told at once");
 }
 
 #[test]
 fn what_is_refused_is_counted_and_stops_nothing() {
     let Some(python) = zenoh() else { return };
-    let node = Node::start();
-    let foreign = node.start_foreign(&python, &["refused"]);
+    let fleet = Fleet::start();
+    let foreign = fleet.start_foreign(&python, &["refused"]);
     let told = foreign.next().expect("a line");
     assert!(told["sent"].as_u64().is_some_and(|sent| sent > 30));
     assert_eq!(told["counted"], told["sent"], "{told}");

@@ -30,7 +30,7 @@ fn python_reads_what_rust_writes() {
     let mut draw = Rng::with_seed(1);
     let vectors: Vec<_> = (0..COUNT).map(|_| written(&envelope(&mut draw))).collect();
     let input: String = vectors.iter().map(|vector| format!("{vector}\n")).collect();
-    let read = lines_of(&python, "vectors.py", &["read", FLEET], &input);
+    let read = lines_of(&python, "vectors.py", &["read", FLEET], input);
     assert_eq!(read.len(), COUNT);
     for (read, written) in read.iter().zip(&vectors) {
         assert_eq!(read, written);
@@ -41,7 +41,7 @@ fn python_reads_what_rust_writes() {
 fn rust_reads_what_python_writes() {
     let Some(python) = python::plain() else { return };
     let count = COUNT.to_string();
-    let vectors = lines_of(&python, "vectors.py", &["write", FLEET, "2", &count], "");
+    let vectors = lines_of(&python, "vectors.py", &["write", FLEET, "2", &count], String::new());
     assert_eq!(vectors.len(), COUNT);
     let mut decoder = Decoder::new(keys());
     for vector in &vectors {
@@ -72,7 +72,7 @@ fn python_subscribes_as_rust_does() {
         pairs.push((prefix, to));
     }
     let line = |(prefix, to): &(Prefix, Address)| format!("{}\n", json!({ "prefix": prefix, "address": to }));
-    let read = lines_of(&python, "vectors.py", &["read", FLEET], &pairs.iter().map(line).collect::<String>());
+    let read = lines_of(&python, "vectors.py", &["read", FLEET], pairs.iter().map(line).collect());
     assert_eq!(read.len(), COUNT);
     assert!(read.iter().filter(|line| line[1] == true).count() > COUNT / 10);
     for (read, (prefix, to)) in read.iter().zip(&pairs) {
