@@ -50,16 +50,12 @@ pub(crate) fn run(
     let dialects = config.bridges.iter().map(|bridge| bridge.dialect).collect();
     let node = Node::new(config).map_err(RuntimeError::Config)?;
     let local = LocalSet::new();
-    let result = local.block_on(&runtime, async move {
-        let (core, ends) = Core::new(node, dialects, runtime_handle());
+    local.block_on(&runtime, async move {
+        let (core, ends) = Core::build(node, dialects, tokio::runtime::Handle::current());
         drive(core, ends, outside, keys, control).await;
     });
     runtime.shutdown_timeout(Duration::from_secs(1));
-    Ok(result)
-}
-
-fn runtime_handle() -> tokio::runtime::Handle {
-    tokio::runtime::Handle::current()
+    Ok(())
 }
 
 /// What the tasks around a core follow.
@@ -107,7 +103,7 @@ async fn drive(
 fn direct(core: Shared) -> crate::bus::Direct {
     Box::new(move |event| match core.try_lock() {
         Some(mut core) => core.handle_on_callback(event),
-        None => Err(event),
+        None => Some(event),
     })
 }
 

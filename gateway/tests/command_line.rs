@@ -4,11 +4,15 @@ use std::process::{Command, Output};
 
 fn aldis(args: &[&str]) -> Output {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
-    Command::new(env!("CARGO_BIN_EXE_aldis")).args(args).current_dir(root).output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_aldis"))
+        .args(args)
+        .current_dir(root)
+        .output()
+        .expect("the program starts")
 }
 
 fn stdout(output: &Output) -> String {
-    String::from_utf8(output.stdout.clone()).unwrap()
+    String::from_utf8(output.stdout.clone()).expect("text")
 }
 
 #[test]

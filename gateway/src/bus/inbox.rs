@@ -20,7 +20,7 @@ const TAKEN_MAX: usize = 512;
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Hands an event to the node on Zenoh's thread, where the node is idle; else gives it back.
-pub(crate) type Direct = Box<dyn Fn(Event) -> Result<(), Event> + Send + Sync>;
+pub(crate) type Direct = Box<dyn Fn(Event) -> Option<Event> + Send + Sync>;
 
 /// Events on their way to the node.
 pub(crate) struct Inbox {
@@ -67,7 +67,7 @@ impl Inbox {
             // What waits goes first, and Zenoh hands over the samples of one stream one after the other: so an event that
             // finds nothing waiting may pass.
             drop(state);
-            if let Err(event) = (self.direct)(event) {
+            if let Some(event) = (self.direct)(event) {
                 self.event(event);
             }
             return;

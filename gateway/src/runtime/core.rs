@@ -80,7 +80,12 @@ pub(crate) struct Core {
 }
 
 impl Core {
-    pub(super) fn new(node: Node, dialects: Vec<Dialect>, runtime: tokio::runtime::Handle) -> (Shared, Ends) {
+    /// A core and what the tasks around it follow.
+    pub(super) fn build(
+        node: Node,
+        dialects: Vec<Dialect>,
+        runtime: tokio::runtime::Handle,
+    ) -> (Shared, Ends) {
         let (timer, timer_end) = watch::channel(None);
         let (paused, paused_end) = watch::channel(false);
         let (exited, exited_end) = watch::channel(false);
@@ -143,15 +148,15 @@ impl Core {
     }
 
     /// Hands an event to the node on Zenoh's thread; gives it back while input is paused.
-    pub(super) fn handle_on_callback(&mut self, event: Event) -> Result<(), Event> {
+    pub(super) fn handle_on_callback(&mut self, event: Event) -> Option<Event> {
         if *self.paused.borrow() {
-            return Err(event);
+            return Some(event);
         }
         let mut events = std::mem::take(&mut self.events);
         events.push(event);
         self.work(&mut events, On::Callback);
         self.events = events;
-        Ok(())
+        None
     }
 
     fn work(&mut self, events: &mut Vec<Event>, on: On) {

@@ -1,7 +1,6 @@
 //! Processes that a benchmark starts: this program again, killed when the measurement ends.
 
 use super::super::exit::Failure;
-use std::io::{BufRead, BufReader};
 use std::net::TcpListener;
 use std::process::{Child, Command, Stdio};
 
@@ -14,20 +13,8 @@ impl Process {
         let failed = |why: std::io::Error| Failure::Failed(format!("cannot start a second process: {why}"));
         let program = std::env::current_exe().map_err(failed)?;
         let mut command = Command::new(program);
-        command.args(args).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::inherit());
+        command.args(args).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::inherit());
         Ok(Self(command.spawn().map_err(failed)?))
-    }
-
-    /// Waits for the next line that it prints.
-    pub(super) fn line(&mut self) -> Result<String, Failure> {
-        let mut line = String::new();
-        if let Some(stdout) = self.0.stdout.as_mut() {
-            // One line at a time, and no more than it: the reader's own buffer is not kept.
-            BufReader::with_capacity(1, stdout)
-                .read_line(&mut line)
-                .map_err(|why| Failure::Failed(format!("the second process cannot be read: {why}")))?;
-        }
-        if line.is_empty() { Err(Failure::Failed("the second process ended early".into())) } else { Ok(line) }
     }
 }
 

@@ -66,11 +66,15 @@ impl Frames {
 /// An AirVehicleState whose info fills it up to the size.
 fn state() -> Result<Vec<u8>, Failure> {
     let with_info = |length: usize| {
-        let mut state = cmasi::AirVehicleState::default();
-        state.id = 400;
-        state.location =
-            Ref::new(cmasi::Location3D { latitude: 45.3, longitude: -120.9, ..Default::default() });
-        state.info = vec![Ref::new(cmasi::KeyValuePair { key: "fill".into(), value: "x".repeat(length) })];
+        let location = cmasi::Location3D { latitude: 45.3, longitude: -120.9, ..Default::default() };
+        let fill = cmasi::KeyValuePair { key: "fill".into(), value: "x".repeat(length) };
+        let base = cmasi::EntityState {
+            id: 400,
+            location: Ref::new(location),
+            info: vec![Ref::new(fill)],
+            ..Default::default()
+        };
+        let state = cmasi::AirVehicleState { base, ..Default::default() };
         lmcp::encode(&state).map_err(failed("the message"))
     };
     let missing = CONTENT_BYTES.saturating_sub(with_info(0)?.len());
