@@ -166,7 +166,7 @@ fn connect(port: u16) -> Result<TcpStream, Failure> {
             }
             Err(why) if Instant::now() > until => return Err(failed("connect")(why)),
             // Nothing tells when a process of ours has begun to listen but trying.
-            Err(_) => std::thread::sleep(Duration::from_millis(20)),
+            Err(_) => std::thread::park_timeout(Duration::from_millis(20)),
         }
     }
 }
