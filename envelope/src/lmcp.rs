@@ -1,4 +1,40 @@
-//! LMCP, the message protocol of UxAS: every type of its seven series, in binary, JSON and XML.
+//! LMCP, the message protocol of UxAS: all 164 types of its seven series, in binary, JSON and XML.
+//!
+//! A type is declared once, in the module of its series ([`cmasi`] and its siblings); the macros that
+//! read the declaration make a plain Rust struct of it, and its place in the schema. What every type
+//! can do then follows:
+//!
+//! - **Binary**: [`decode`], [`decode_as`], [`encode`]. What is decoded is encoded to the same bytes.
+//!   A type or version that is not declared here is told ([`DecodeError::is_unknown_type`]), so that
+//!   its message is carried as it is.
+//! - **Without decoding**: [`Header::peek`], [`natural_key`], [`position`].
+//! - **Text**: [`to_json`] and [`from_json`], strict; [`to_xml`] and [`read_xml`], which is as
+//!   tolerant as users' scenario files need.
+//! - **By name**: [`type_of`], [`descendants`]; the fields of any [`Object`] by [`Object::view`] and
+//!   [`Object::slot`].
+//!
+//! A struct holds its parent's part as `base` and dereferences to it. A field for an object is a
+//! [`Ref`]: null, of the declared type, or of one that descends from it.
+//!
+//! Bytes are not trusted: lengths are checked against what is left, depth against [`DEPTH_MAX`], memory
+//! against [`MEMORY_FACTOR`] and [`MEMORY_FLOOR`].
+//!
+//! ```
+//! use aldis_envelope::lmcp::cmasi::{EntityState, AirVehicleState, Location3D};
+//! use aldis_envelope::lmcp::{decode, encode, natural_key};
+//!
+//! let mut state = AirVehicleState::default();
+//! state.id = 400;
+//! state.location = Location3D { latitude: 45.3, longitude: -121.0, ..Location3D::default() }.into();
+//! let message = encode(&state)?;
+//!
+//! assert_eq!(natural_key("afrl.cmasi.AirVehicleState", &message), Some(400));
+//! let object = decode(&message)?;
+//! assert_eq!(object.type_info().full_name, "afrl.cmasi.AirVehicleState");
+//! let entity: &EntityState = object.get().expect("a state of an aircraft is one of an entity");
+//! assert_eq!(entity.id, 400);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 #[macro_use]
 mod declare;

@@ -3,6 +3,6 @@
 mod inbox;
 mod session;
 
-pub(crate) use inbox::Inbox;
+pub(crate) use inbox::{Direct, Inbox};
 pub(crate) use session::{Bus, BusError};
 pub(crate) use zenoh::qos::CongestionControl as Congestion;

@@ -1,7 +1,9 @@
 //! The command line.
 
+mod bench;
 mod call;
 mod check;
+mod demo;
 mod exit;
 mod fleet;
 mod member;
@@ -36,6 +38,8 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    /// A shore station and three boats in one process.
+    Demo(demo::Demo),
     /// Run a node until it is stopped (SIGINT or SIGTERM).
     Run(run::Run),
     /// Say what is wrong with configurations, if anything.
@@ -52,12 +56,15 @@ enum Command {
     Call(call::CallArgs),
     /// Show who is there.
     Fleet(fleet::FleetArgs),
+    /// Measure this machine, side by side with the limit.
+    Bench(bench::Bench),
 }
 
 /// Runs what the command line says.
 pub(crate) fn main() -> ExitCode {
     let cli = Cli::parse();
     let done = match cli.command {
+        Command::Demo(args) => args.run(),
         Command::Run(args) => args.run(),
         Command::Check(args) => args.run(),
         Command::Acl(args) => args.run(),
@@ -66,6 +73,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Sub(args) => args.run(),
         Command::Call(args) => args.run(),
         Command::Fleet(args) => args.run(),
+        Command::Bench(args) => args.run(),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -18,16 +18,16 @@ mod schema;
 mod service;
 mod text;
 
-pub(crate) use acl::{AclError, acl};
-pub(crate) use allow::{Allow, Called, Callers};
-pub(crate) use bridge::{Bridge, Endpoint, UxasTcp};
+pub(crate) use acl::acl;
+pub(crate) use allow::Allow;
+pub(crate) use bridge::{Bridge, Endpoint};
 pub(crate) use bus::Bus;
 pub(crate) use entities::{Entities, Operators};
 pub(crate) use error::ConfigError;
 pub(crate) use locator::Locator;
 pub(crate) use schema::schema;
-pub(crate) use service::{Service, Track};
-pub(crate) use text::{PlainName, RequestPrefix};
+pub(crate) use service::Service;
+pub(crate) use text::PlainName;
 
 use aldis_envelope::{Fleet, Prefix};
 use error::Fault;

@@ -2,6 +2,7 @@
 
 mod bus_task;
 mod core;
+mod disk;
 mod wiring;
 
 pub(crate) use core::{Core, Shared};
@@ -12,7 +13,7 @@ use aldis_services::event::BridgeId;
 use aldis_services::{Event, Node, NodeConfig};
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{Notify, mpsc, watch};
 use tokio::task::LocalSet;
 
 /// How long the orderly end of a node may take before it is cut off.
@@ -49,16 +50,12 @@ pub(crate) fn run(
     let dialects = config.bridges.iter().map(|bridge| bridge.dialect).collect();
     let node = Node::new(config).map_err(RuntimeError::Config)?;
     let local = LocalSet::new();
-    let result = local.block_on(&runtime, async move {
-        let (core, ends) = Core::new(node, dialects, runtime_handle());
+    local.block_on(&runtime, async move {
+        let (core, ends) = Core::build(node, dialects, tokio::runtime::Handle::current());
         drive(core, ends, outside, keys, control).await;
     });
     runtime.shutdown_timeout(Duration::from_secs(1));
-    Ok(result)
-}
-
-fn runtime_handle() -> tokio::runtime::Handle {
-    tokio::runtime::Handle::current()
+    Ok(())
 }
 
 /// What the tasks around a core follow.
@@ -67,6 +64,7 @@ pub(crate) struct Ends {
     pub(crate) paused: watch::Receiver<bool>,
     pub(crate) exited: watch::Receiver<bool>,
     pub(crate) jobs: mpsc::UnboundedReceiver<Event>,
+    pub(crate) wake: Arc<Notify>,
 }
 
 async fn drive(
@@ -76,12 +74,14 @@ async fn drive(
     keys: aldis_envelope::Keys,
     control: mpsc::UnboundedReceiver<Control>,
 ) {
-    let Ends { timer, paused, mut exited, jobs } = ends;
+    let Ends { timer, paused, mut exited, jobs, wake } = ends;
     core.lock().handle(&mut Vec::new());
     let (silence, silenced) = watch::channel(false);
-    let inbox = Arc::new(crate::bus::Inbox::new(keys.clone()));
+    let inbox = Arc::new(crate::bus::Inbox::new(keys.clone(), direct(core.clone())));
     let mut tasks = tokio::task::JoinSet::new();
     tasks.spawn_local(deadlines(core.clone(), timer));
+    tasks.spawn_local(disk::watch(core.clone()));
+    tasks.spawn_local(deferred(core.clone(), wake));
     tasks.spawn_local(job_results(core.clone(), jobs));
     tasks.spawn_local(bus_task::drain(core.clone(), inbox.clone(), paused.clone()));
     for (i, endpoint) in outside.bridges.into_iter().enumerate() {
@@ -99,6 +99,21 @@ async fn drive(
     tasks.shutdown().await;
 }
 
+/// The way of an event to an idle node, on the thread that has it.
+fn direct(core: Shared) -> crate::bus::Direct {
+    Box::new(move |event| match core.try_lock() {
+        Some(mut core) => core.handle_on_callback(event),
+        None => Some(event),
+    })
+}
+
+async fn deferred(core: Shared, wake: Arc<Notify>) {
+    loop {
+        wake.notified().await;
+        core.lock().handle(&mut Vec::new());
+    }
+}
+
 async fn deadlines(core: Shared, mut timer: watch::Receiver<Option<aldis_envelope::Monotonic>>) {
     loop {
         let Some(at) = *timer.borrow_and_update() else {
@@ -108,19 +123,27 @@ async fn deadlines(core: Shared, mut timer: watch::Receiver<Option<aldis_envelop
             continue;
         };
         let at = core.lock().clock().instant(at);
+        if at <= std::time::Instant::now() {
+            // Tokio's timers are a millisecond late, which is long for what is due now.
+            tokio::task::yield_now().await;
+            deadline(&core);
+            continue;
+        }
         tokio::select! {
             changed = timer.changed() => {
                 if changed.is_err() {
                     return;
                 }
             }
-            () = tokio::time::sleep_until(at.into()) => {
-                let mut core = core.lock();
-                core.disarm();
-                core.handle(&mut vec![Event::Deadline]);
-            }
+            () = tokio::time::sleep_until(at.into()) => deadline(&core),
         }
     }
+}
+
+fn deadline(core: &Shared) {
+    let mut core = core.lock();
+    core.disarm();
+    core.handle(&mut vec![Event::Deadline]);
 }
 
 async fn job_results(core: Shared, mut jobs: mpsc::UnboundedReceiver<Event>) {

@@ -35,9 +35,10 @@ pub fn decode(message: &[u8]) -> Result<Box<dyn Object>, DecodeError> {
 /// As [`decode`], and when the message is of another type than `T`, be it a descendant.
 pub fn decode_as<T: Struct>(message: &[u8]) -> Result<T, DecodeError> {
     decode_root(message, |header, reader| {
-        if !header.is(T::TYPE) {
-            let found = header.type_info().or_else(|fault| reader.fail_header(fault))?.full_name;
-            return reader.fail_header(DecodeFault::Kind { expected: T::TYPE.full_name, found });
+        let info = header.type_info().or_else(|fault| reader.fail_header(fault))?;
+        if info != T::TYPE {
+            let (expected, found) = (T::TYPE.full_name, info.full_name);
+            return reader.fail_header(DecodeFault::Kind { expected, found });
         }
         let mut object = T::default();
         object.decode_fields(reader)?;
@@ -139,11 +140,7 @@ fn verify_checksum(message: &[u8]) -> Result<(), DecodeError> {
 impl Writer<'_> {
     /// An object with what tells its type.
     pub(super) fn object(&mut self, object: &dyn Object) -> writer::Encoded {
-        let info = object.type_info();
-        self.put(&[1]);
-        self.put(&info.series.name.0.to_be_bytes());
-        self.put(&info.id.to_be_bytes());
-        self.put(&info.series.version.to_be_bytes());
+        self.put(&object.type_info().header);
         self.nested(|writer| object.encode_fields(writer))
     }
 

@@ -127,6 +127,7 @@ macro_rules! lmcp_types {
                             kind: <$type as $crate::lmcp::Value>::KIND,
                         },
                     )*],
+                    header: $series.header($id),
                     default: || Box::new(Self::default()),
                 };
             }

@@ -119,15 +119,16 @@ impl<T: Value, const N: usize> List for [T; N] {
 }
 
 /// Reads `count` elements, if so many can be in the bytes that are left. Room is made for as many as
-/// these bytes can hold if none is null, and for more as nulls are met.
+/// these bytes can hold if none is null, and doubled while nulls are met.
 fn decode_elements<T: Value>(list: &mut Vec<T>, count: usize, reader: &mut Reader<'_>) -> Decoded<()> {
     reader.bound(count, const { T::KIND.size_min() })?;
     list.clear();
     while list.len() < count {
         let read = list.len();
-        let room = (reader.left() / const { T::KIND.size_full() } + 1).min(count - read);
+        let room = (reader.left() / const { T::KIND.size_full() } + 1).max(read).min(count - read);
         reader.allocate((read + room).saturating_mul(size_of::<T>()))?;
         list.reserve_exact(room);
+        reader.release(read * size_of::<T>());
         list.resize_with(read + room, T::blank);
         decode_in_place(list, read, reader)?;
     }

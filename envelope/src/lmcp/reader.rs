@@ -126,6 +126,12 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// Takes `bytes` that were accounted for back: they are free again.
+    #[inline]
+    pub(super) fn release(&mut self, bytes: usize) {
+        self.memory += bytes;
+    }
+
     /// Checks that `count` elements of at least `size_min` bytes can follow.
     #[inline]
     pub(super) fn bound(&self, count: usize, size_min: usize) -> Decoded<()> {
@@ -135,16 +141,28 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// Passes over `expected`, if that is what follows.
+    #[inline(always)]
+    pub(super) fn skip(&mut self, expected: &[u8; HEADER]) -> bool {
+        match self.rest.split_first_chunk() {
+            Some((bytes, rest)) if bytes == expected => {
+                self.rest = rest;
+                true
+            }
+            _ => false,
+        }
+    }
+
     /// Reads what is inside an object.
     #[inline]
-    pub(super) fn nested(&mut self, read: impl FnOnce(&mut Self) -> Decoded<()>) -> Decoded<()> {
+    pub(super) fn nested<T>(&mut self, read: impl FnOnce(&mut Self) -> Decoded<T>) -> Decoded<T> {
         if self.depth == DEPTH_MAX {
             return self.fail(DecodeFault::Depth);
         }
         self.depth += 1;
-        read(self)?;
+        let inside = read(self)?;
         self.depth -= 1;
-        Ok(())
+        Ok(inside)
     }
 
     /// What tells an object's type: none for a null.

@@ -5,7 +5,7 @@ use std::fmt;
 use super::error::DecodeFault;
 use super::object::{Object, Struct};
 use super::reader::{Decoded, Header, Reader};
-use super::schema::Kind;
+use super::schema::{Kind, TypeInfo};
 use super::value::{Reference, Slot, Value, View};
 use super::writer::{Encoded, Writer};
 
@@ -66,23 +66,30 @@ impl<T: Struct> Ref<T> {
         matches!(self.0, Content::Null)
     }
 
-    fn decode_object(&mut self, header: Header, reader: &mut Reader<'_>) -> Decoded<()> {
-        if header.is(T::TYPE) {
-            self.0 = Content::Exact(T::default());
-            let Content::Exact(object) = &mut self.0 else { return Ok(()) };
-            return object.decode_fields(reader);
+    fn decode_exact(&mut self, reader: &mut Reader<'_>) -> Decoded<()> {
+        self.0 = Content::Exact(T::default());
+        match &mut self.0 {
+            Content::Exact(object) => object.decode_fields(reader),
+            Content::Null | Content::Descendant(_) => Ok(()),
         }
-        let info = header.type_info().or_else(|fault| reader.fail_header(fault))?;
-        if !info.is_a(T::TYPE) {
-            let (expected, found) = (T::TYPE.full_name, info.full_name);
-            return reader.fail_header(DecodeFault::Kind { expected, found });
-        }
-        let mut object = (info.default)();
-        reader.allocate(size_of_val(object.as_ref()))?;
-        object.decode_fields(reader)?;
-        self.0 = Content::Descendant(object);
-        Ok(())
     }
+}
+
+/// Reads the fields of an object that is not of the very type declared, but must descend from it.
+fn decode_descendant(
+    header: Header,
+    declared: &'static TypeInfo,
+    reader: &mut Reader<'_>,
+) -> Decoded<Box<dyn Object>> {
+    let info = header.type_info().or_else(|fault| reader.fail_header(fault))?;
+    if !info.is_a(declared) {
+        let (expected, found) = (declared.full_name, info.full_name);
+        return reader.fail_header(DecodeFault::Kind { expected, found });
+    }
+    let mut object = (info.default)();
+    reader.allocate(size_of_val(object.as_ref()))?;
+    object.decode_fields(reader)?;
+    Ok(object)
 }
 
 impl<T: Struct> Value for Ref<T> {
@@ -92,10 +99,14 @@ impl<T: Struct> Value for Ref<T> {
     }
     fn decode(&mut self, reader: &mut Reader<'_>) -> Decoded<()> {
         self.0 = Content::Null;
-        match reader.header()? {
-            Some(header) => reader.nested(|reader| self.decode_object(header, reader)),
-            None => Ok(()),
+        if reader.skip(&T::TYPE.header) {
+            return reader.nested(|reader| self.decode_exact(reader));
         }
+        if let Some(header) = reader.header()? {
+            let object = reader.nested(|reader| decode_descendant(header, T::TYPE, reader))?;
+            self.0 = Content::Descendant(object);
+        }
+        Ok(())
     }
     fn encode(&self, writer: &mut Writer<'_>) -> Encoded {
         match self.object() {

@@ -45,12 +45,6 @@ pub fn descendants(info: &'static TypeInfo) -> impl Iterator<Item = &'static Typ
 }
 
 impl Header {
-    /// Whether it tells that type, in the version declared here.
-    #[inline]
-    pub(super) fn is(&self, info: &TypeInfo) -> bool {
-        self.type_id == info.id && self.series == info.series.name && self.version == info.series.version
-    }
-
     /// The type that it tells.
     ///
     /// # Errors

@@ -55,6 +55,17 @@ pub struct Series {
     pub version: u16,
 }
 
+impl Series {
+    /// What an object of the type of that number begins with on the wire: its presence, the series,
+    /// the number and the version.
+    pub(super) const fn header(&self, type_id: u32) -> [u8; HEADER] {
+        let [s0, s1, s2, s3, s4, s5, s6, s7] = self.name.0.to_be_bytes();
+        let [t0, t1, t2, t3] = type_id.to_be_bytes();
+        let [v0, v1] = self.version.to_be_bytes();
+        [1, s0, s1, s2, s3, s4, s5, s6, s7, t0, t1, t2, t3, v0, v1]
+    }
+}
+
 /// One message type: a struct of a series.
 pub struct TypeInfo {
     /// The series that it belongs to.
@@ -69,6 +80,8 @@ pub struct TypeInfo {
     pub parent: Option<&'static TypeInfo>,
     /// Its own fields in wire order, without those of its parents.
     pub own_fields: &'static [FieldInfo],
+    /// What an object of this type begins with on the wire.
+    pub(super) header: [u8; HEADER],
     /// Makes an object of this type, every field at its default.
     pub default: fn() -> Box<dyn Object>,
 }

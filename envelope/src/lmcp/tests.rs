@@ -2,18 +2,22 @@
 
 mod golden;
 mod hostile;
+mod json;
 mod model;
 mod roundtrip;
 mod xml;
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 /// A folder of the reference's data, which lies beside the project and is no part of it: tests that
 /// need it pass without, and say so.
 fn shared(folder: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/uxas").join(folder);
     if !path.exists() {
-        eprintln!("SKIPPED: {} is not there", path.display());
+        // Not by `eprintln!`, which the test harness keeps to itself when a test passes.
+        let _ = writeln!(std::io::stderr(), "SKIPPED: {} is not there", path.display());
         return None;
     }
     Some(path)
@@ -39,9 +43,11 @@ fn read(path: &Path) -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 
-/// One message of each type, every field set, from the reference.
-fn golden_messages() -> Vec<Vec<u8>> {
-    shared("lmcp")
-        .map(|folder| files(&folder, "lmcp").iter().map(|path| read(path)).collect())
-        .unwrap_or_default()
+/// One message of each type, every field set, from the reference; none when it is not there.
+fn golden_messages() -> &'static [Vec<u8>] {
+    static MESSAGES: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
+        let paths = shared("lmcp").map(|folder| files(&folder, "lmcp")).unwrap_or_default();
+        paths.iter().map(|path| read(path)).collect()
+    });
+    &MESSAGES
 }

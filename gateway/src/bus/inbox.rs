@@ -1,9 +1,10 @@
-//! What Zenoh's threads hand to the node's loop: bounded, and it says what it sheds.
+//! What Zenoh's threads hand to the node: straight, while it is idle; else by a bounded queue that says what it sheds.
 
 use aldis_envelope::Keys;
 use aldis_envelope::codec::native::Decoder;
 use aldis_services::Event;
 use bytes::Bytes;
+use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::sync::Notify;
@@ -11,12 +12,19 @@ use tokio::sync::Notify;
 /// How many events may wait. At a million samples a second this is 65 ms of the loop's absence.
 const EVENTS_MAX: usize = 65_536;
 
+/// How many are taken at once: less than what makes a bridge's queue overflow before the node can pause.
+const TAKEN_MAX: usize = 512;
+
 /// How long Zenoh's thread waits for a place before it sheds. Its peer's senders wait as long, so it stays well below
 /// the five seconds after which Zenoh gives up a transport.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Events on their way to the loop.
+/// Hands an event to the node on Zenoh's thread, where the node is idle; else gives it back.
+pub(crate) type Direct = Box<dyn Fn(Event) -> Option<Event> + Send + Sync>;
+
+/// Events on their way to the node.
 pub(crate) struct Inbox {
+    direct: Direct,
     state: Mutex<State>,
     filled: Notify,
     emptied: Condvar,
@@ -24,17 +32,17 @@ pub(crate) struct Inbox {
 
 struct State {
     decoder: Decoder,
-    events: Vec<Event>,
+    events: VecDeque<Event>,
     shed: u64,
     /// Keys seen for the first time, to be declared outside of Zenoh's callback.
     learned: Vec<String>,
 }
 
 impl Inbox {
-    pub(crate) fn new(keys: Keys) -> Self {
+    pub(crate) fn new(keys: Keys, direct: Direct) -> Self {
         let decoder = Decoder::new(keys);
-        let state = State { decoder, events: Vec::new(), shed: 0, learned: Vec::new() };
-        Self { state: Mutex::new(state), filled: Notify::new(), emptied: Condvar::new() }
+        let state = State { decoder, events: VecDeque::new(), shed: 0, learned: Vec::new() };
+        Self { direct, state: Mutex::new(state), filled: Notify::new(), emptied: Condvar::new() }
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -55,6 +63,14 @@ impl Inbox {
         };
         if state.decoder.take_learned() {
             state.learned.push(key.to_owned());
+        } else if state.events.is_empty() {
+            // What waits goes first, and Zenoh hands over the samples of one stream one after the other: so an event that
+            // finds nothing waiting may pass.
+            drop(state);
+            if let Some(event) = (self.direct)(event) {
+                self.event(event);
+            }
+            return;
         }
         self.push(state, event);
     }
@@ -66,7 +82,7 @@ impl Inbox {
 
     fn push(&self, mut state: MutexGuard<'_, State>, event: Event) {
         let was_empty = state.events.is_empty();
-        state.events.push(event);
+        state.events.push_back(event);
         drop(state);
         if was_empty {
             self.filled.notify_one();
@@ -90,15 +106,19 @@ impl Inbox {
         self.filled.notified().await;
     }
 
-    /// Takes all events, in their order, and the keys to declare. `into` must be empty; its memory is reused.
-    pub(crate) fn drain(&self, into: &mut Vec<Event>) -> Vec<String> {
+    /// Takes the next events, in their order, and the keys to declare. Wakes [`Self::filled`] again where some are left.
+    pub(crate) fn take(&self, into: &mut Vec<Event>) -> Vec<String> {
         let mut state = self.lock();
-        std::mem::swap(&mut state.events, into);
+        let count = state.events.len().min(TAKEN_MAX);
+        into.extend(state.events.drain(..count));
         if state.shed > 0 {
             into.push(Event::SamplesShed(std::mem::take(&mut state.shed)));
         }
-        let learned = std::mem::take(&mut state.learned);
+        let (learned, some_left) = (std::mem::take(&mut state.learned), !state.events.is_empty());
         drop(state);
+        if some_left {
+            self.filled.notify_one();
+        }
         self.emptied.notify_all();
         learned
     }

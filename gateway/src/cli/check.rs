@@ -2,7 +2,7 @@
 
 use super::exit::Failure;
 use super::print_line;
-use crate::config::{self, Config};
+use crate::config::{self, Config, ConfigError};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -13,7 +13,8 @@ pub(crate) struct Check {
     /// The configurations.
     #[arg(required = true)]
     configs: Vec<PathBuf>,
-    /// One JSON object a file: `file`, `ok`, and where it is wrong `message`, `line`, `column`, `help`.
+    /// One JSON object a file: `file`, `ok`, and where it is wrong `message`, `line`, `column`, `help`,
+    /// and `more` mistakes.
     #[arg(long)]
     json: bool,
 }
@@ -34,7 +35,7 @@ impl Check {
                     let place = error.position();
                     print_line(json!({
                         "file": error.file(), "ok": false, "message": error.message(), "help": error.cure(),
-                        "line": place.map(|(line, _)| line), "column": place.map(|(_, column)| column),
+                        "more": error.more().iter().map(ConfigError::message).collect::<Vec<_>>(), "line": place.map(|(line, _)| line), "column": place.map(|(_, column)| column),
                     }));
                 }
                 Err(error) => eprintln!("{:?}", miette::Report::new(error)),

@@ -7,7 +7,7 @@ use super::text::PlainName;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-pub(crate) use translate::{BusError, password, zenoh_config};
+pub(crate) use translate::{BusError, zenoh_config};
 
 /// The `[bus]` table. Files are looked for beside the configuration file, unless their path is absolute.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]

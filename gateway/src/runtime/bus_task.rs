@@ -106,8 +106,9 @@ pub(super) async fn drain(core: Shared, inbox: Arc<Inbox>, mut paused: watch::Re
         if paused.wait_for(|paused| !*paused).await.is_err() {
             return;
         }
-        let learned = inbox.drain(&mut events);
+        // Locked before the inbox is emptied: no event of a callback may pass those that waited.
         let mut core = core.lock();
+        let learned = inbox.take(&mut events);
         core.handle(&mut events);
         if let Some(bus) = core.bus() {
             bus.declare_learned(learned);

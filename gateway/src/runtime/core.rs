@@ -8,25 +8,67 @@ use crate::clock::Clock;
 use aldis_envelope::{Dialect, Monotonic};
 use aldis_services::service::{Job, Level, Note};
 use aldis_services::{Effect, Event, Node};
+use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use tokio::sync::{mpsc, watch};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::time::Duration;
+use tokio::sync::{Notify, mpsc, watch};
 
 /// A core that the tasks of a node share.
 #[derive(Clone)]
-pub(crate) struct Shared(Arc<Mutex<Core>>);
+pub(crate) struct Shared {
+    core: Arc<Mutex<Core>>,
+    /// How many wait for the lock. Callbacks, which come in quick succession, stand back for them.
+    waiting: Arc<AtomicUsize>,
+}
 
 impl Shared {
     pub(crate) fn lock(&self) -> MutexGuard<'_, Core> {
         // Services' panics are caught inside the node; a panic here is a fault of the shell, and the node is whole.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.waiting.fetch_add(1, Ordering::Relaxed);
+        let core = self.core.lock().unwrap_or_else(PoisonError::into_inner);
+        self.waiting.fetch_sub(1, Ordering::Relaxed);
+        core
     }
+
+    /// Locks the node where nobody else has it or waits for it.
+    pub(super) fn try_lock(&self) -> Option<MutexGuard<'_, Core>> {
+        if self.waiting.load(Ordering::Relaxed) > 0 {
+            return None;
+        }
+        match self.core.try_lock() {
+            Ok(core) => Some(core),
+            Err(TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
+            Err(TryLockError::WouldBlock) => None,
+        }
+    }
+}
+
+/// A callback sends things out itself only after this long without: while more goes out, the loop does it, in larger pieces.
+/// Putting on the bus may also block until the far side takes something, and a far side that is blocked in the same way
+/// would never do; so Zenoh's thread, which must go on taking, does not put when much goes out.
+const QUIET: Duration = Duration::from_micros(20);
+
+/// On whose thread effects are carried out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum On {
+    /// The node's own loop.
+    Loop,
+    /// A callback of Zenoh's.
+    Callback,
 }
 
 /// The node and its hands.
 pub(crate) struct Core {
     node: Node,
+    /// What a callback left for the loop to carry out on the bus. While something is here, more goes behind it.
+    deferred: VecDeque<Effect>,
+    wake: Arc<Notify>,
+    last_out: Option<Monotonic>,
     clock: Clock,
+    /// Kept for their memory.
+    events: Vec<Event>,
     effects: Vec<Effect>,
     bus: Option<Bus>,
     peers: Peers,
@@ -38,16 +80,37 @@ pub(crate) struct Core {
 }
 
 impl Core {
-    pub(super) fn new(node: Node, dialects: Vec<Dialect>, runtime: tokio::runtime::Handle) -> (Shared, Ends) {
+    /// A core and what the tasks around it follow.
+    pub(super) fn build(
+        node: Node,
+        dialects: Vec<Dialect>,
+        runtime: tokio::runtime::Handle,
+    ) -> (Shared, Ends) {
         let (timer, timer_end) = watch::channel(None);
         let (paused, paused_end) = watch::channel(false);
         let (exited, exited_end) = watch::channel(false);
         let (jobs, jobs_end) = mpsc::unbounded_channel();
         let peers = Peers::new(dialects);
         let (clock, effects) = (Clock::start(), Vec::new());
-        let core = Self { node, clock, effects, bus: None, peers, runtime, timer, paused, exited, jobs };
-        let ends = Ends { timer: timer_end, paused: paused_end, exited: exited_end, jobs: jobs_end };
-        (Shared(Arc::new(Mutex::new(core))), ends)
+        let wake = Arc::new(Notify::new());
+        let core = Self {
+            node,
+            deferred: VecDeque::new(),
+            wake: wake.clone(),
+            last_out: None,
+            clock,
+            events: Vec::new(),
+            effects,
+            bus: None,
+            peers,
+            runtime,
+            timer,
+            paused,
+            exited,
+            jobs,
+        };
+        let ends = Ends { timer: timer_end, paused: paused_end, exited: exited_end, jobs: jobs_end, wake };
+        (Shared { core: Arc::new(Mutex::new(core)), waiting: Arc::default() }, ends)
     }
 
     pub(crate) fn clock(&self) -> Clock {
@@ -78,24 +141,46 @@ impl Core {
     /// Hands events to the node and carries out what it wants, until nothing is left to do. The events are taken; their
     /// memory stays with the caller.
     pub(crate) fn handle(&mut self, events: &mut Vec<Event>) {
+        while let Some(effect) = self.deferred.pop_front() {
+            self.carry_out_on_bus(effect, events);
+        }
+        self.work(events, On::Loop);
+    }
+
+    /// Hands an event to the node on Zenoh's thread; gives it back while input is paused.
+    pub(super) fn handle_on_callback(&mut self, event: Event) -> Option<Event> {
+        if *self.paused.borrow() {
+            return Some(event);
+        }
+        let mut events = std::mem::take(&mut self.events);
+        events.push(event);
+        self.work(&mut events, On::Callback);
+        self.events = events;
+        None
+    }
+
+    fn work(&mut self, events: &mut Vec<Event>, on: On) {
         loop {
             let now = self.clock.now();
             let mut effects = std::mem::take(&mut self.effects);
             self.node.handle(now, events, &mut effects);
             for effect in effects.drain(..) {
-                if let Err(why) = self.carry_out(effect) {
-                    self.bus_failed(&why, events);
-                }
+                self.carry_out(now.monotonic, effect, on, events);
             }
             self.effects = effects;
-            self.peers.flush(events);
+            if on == On::Callback && self.peers.has_output() && !self.is_quiet(now.monotonic) {
+                self.wake.notify_one();
+            } else if self.peers.has_output() {
+                self.last_out = Some(now.monotonic);
+                self.peers.flush(events);
+            }
             if events.is_empty() {
                 return;
             }
         }
     }
 
-    fn carry_out(&mut self, effect: Effect) -> Result<(), BusError> {
+    fn carry_out(&mut self, now: Monotonic, effect: Effect, on: On, events: &mut Vec<Event>) {
         match effect {
             Effect::Send(bridge, peer, label, content) => self.peers.send(bridge, peer, &label, &content),
             Effect::Arm(at) => {
@@ -109,19 +194,36 @@ impl Core {
             Effect::Exit => {
                 self.exited.send_replace(true);
             }
+            bus if on == On::Loop || self.may_put_here(now, &bus) => {
+                self.last_out = Some(now);
+                self.carry_out_on_bus(bus, events);
+            }
             bus => {
-                if let Some(on) = &mut self.bus {
-                    return carry_out_on_bus(on, bus);
-                }
+                self.deferred.push_back(bus);
+                self.wake.notify_one();
             }
         }
-        Ok(())
+    }
+
+    fn is_quiet(&self, now: Monotonic) -> bool {
+        self.last_out.is_none_or(|last| now - last > QUIET)
+    }
+
+    /// Whether a callback may do this on the bus itself: it never declares, and puts only while little goes out.
+    fn may_put_here(&self, now: Monotonic, effect: &Effect) -> bool {
+        self.deferred.is_empty() && matches!(effect, Effect::Publish(..)) && self.is_quiet(now)
+    }
+
+    fn carry_out_on_bus(&mut self, effect: Effect, events: &mut Vec<Event>) {
+        let Some(bus) = &mut self.bus else { return };
+        if let Err(why) = carry_out_on_bus(bus, effect) {
+            self.bus_failed(&why, events);
+        }
     }
 
     fn bus_failed(&mut self, why: &BusError, events: &mut Vec<Event>) {
-        let gone = self.bus.as_ref().is_some_and(Bus::is_closed);
-        if gone {
-            self.bus = None;
+        // The session itself is given up by the task that keeps it: dropping it here could block.
+        if self.bus.as_ref().is_some_and(Bus::is_closed) {
             events.push(Event::BusClosed(why.to_string()));
         } else {
             tracing::warn!("bus: {why}");

@@ -1,13 +1,16 @@
 //! What a UxAS peer sends, as messages of this node (uxas-wire, Envelope).
 
 use aldis_envelope::codec::delimited::{DelimitedError, payload_offset, read_head};
-use aldis_envelope::{EntityId, Label, Message, Prefix, Source};
+use aldis_envelope::{ContentType, EntityId, Instance, Label, Message, Prefix, Source, lmcp};
 use bytes::Bytes;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// How many heads are remembered: a peer repeats a few dozen. Beyond it the memory is forgotten whole.
 const HEADS_MAX: usize = 4_096;
+
+/// How many instances are remembered, likewise.
+const INSTANCES_MAX: usize = 4_096;
 
 /// Why a message of a peer does not enter.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -25,8 +28,16 @@ pub enum Refused {
 
 #[derive(Debug, Clone)]
 struct Head {
-    verdict: Result<Arc<Label>, Refused>,
+    verdict: Result<Accepted, Refused>,
     assigned: bool,
+}
+
+/// A head that enters.
+#[derive(Debug, Clone)]
+struct Accepted {
+    label: Arc<Label>,
+    /// Whether its type has a natural key, which makes it an instance.
+    keyed: bool,
 }
 
 /// Reads the messages of UxAS peers. The head of a message repeats in a stream, so verdicts on heads are kept.
@@ -36,7 +47,8 @@ pub struct Importer {
     entities: Vec<EntityId>,
     import: Vec<Prefix>,
     heads: BTreeMap<Bytes, Head>,
-    last: Option<(Bytes, Arc<Label>)>,
+    instances: BTreeMap<i64, Arc<Instance>>,
+    last: Option<(Bytes, Accepted)>,
 }
 
 /// A message read, and whether its source had to be assigned.
@@ -51,7 +63,7 @@ pub struct Imported {
 impl Importer {
     /// An importer of the bridge `own` on a node that speaks for `entities`.
     pub fn new(own: Source, entities: Vec<EntityId>, import: Vec<Prefix>) -> Self {
-        Self { own, entities, import, heads: BTreeMap::new(), last: None }
+        Self { own, entities, import, heads: BTreeMap::new(), instances: BTreeMap::new(), last: None }
     }
 
     /// Reads a message in delimited form.
@@ -59,20 +71,33 @@ impl Importer {
     /// # Errors
     /// [`Refused`]: why the message does not enter.
     pub fn read(&mut self, message: Bytes) -> Result<Imported, Refused> {
-        if let Some((head, label)) = &self.last
+        if let Some((head, accepted)) = &self.last
             && message.starts_with(head)
             && message.len() > head.len()
         {
-            let content = message.slice(head.len()..);
-            return Ok(Imported { message: Message::new(label.clone(), content), assigned: false });
+            let (content, accepted) = (message.slice(head.len()..), accepted.clone());
+            return Ok(Imported { message: self.message(&accepted, content), assigned: false });
         }
         let offset = payload_offset(&message)?;
         let head = self.head(&message[..offset]);
-        let label = head.verdict?;
+        let accepted = head.verdict?;
         if !head.assigned {
-            self.last = Some((Bytes::copy_from_slice(&message[..offset]), label.clone()));
+            self.last = Some((Bytes::copy_from_slice(&message[..offset]), accepted.clone()));
         }
-        Ok(Imported { message: Message::new(label, message.slice(offset..)), assigned: head.assigned })
+        Ok(Imported { message: self.message(&accepted, message.slice(offset..)), assigned: head.assigned })
+    }
+
+    fn message(&mut self, accepted: &Accepted, content: Bytes) -> Message {
+        let label = accepted.label.clone();
+        let key = if accepted.keyed { lmcp::natural_key(label.descriptor(), &content) } else { None };
+        Message { instance: key.map(|key| self.instance(key)), ..Message::new(label, content) }
+    }
+
+    fn instance(&mut self, key: i64) -> Arc<Instance> {
+        if self.instances.len() >= INSTANCES_MAX {
+            self.instances.clear();
+        }
+        self.instances.entry(key).or_insert_with(|| Arc::new(Instance::of_number(key))).clone()
     }
 
     fn head(&mut self, bytes: &[u8]) -> Head {
@@ -100,7 +125,9 @@ impl Importer {
         } else if !self.import.iter().any(|prefix| prefix.matches(&label.address)) {
             Err(Refused::Filtered)
         } else {
-            Ok(Arc::new(label))
+            let keyed = label.attributes.content_type == ContentType::Lmcp
+                && lmcp::type_of(label.descriptor()).is_some_and(|info| lmcp::key_of(info).is_some());
+            Ok(Accepted { label: Arc::new(label), keyed })
         };
         Head { verdict, assigned }
     }
@@ -131,6 +158,24 @@ mod tests {
                 ("eid400sid20", true)
             );
         }
+    }
+
+    #[test]
+    fn a_type_with_a_natural_key_is_an_instance() {
+        let mut importer = importer(&[""]);
+        let base = lmcp::cmasi::EntityState { id: 7, ..Default::default() };
+        let state = lmcp::cmasi::AirVehicleState { base, ..Default::default() };
+        let mut instance = |content: &[u8]| {
+            let head = b"afrl.cmasi.AirVehicleState$lmcp|afrl.cmasi.AirVehicleState||100|61$".as_slice();
+            importer
+                .read([head, content].concat().into())
+                .unwrap()
+                .message
+                .instance
+                .map(|instance| instance.hash)
+        };
+        assert_eq!(instance(&lmcp::encode(&state).unwrap()), Some(Instance::of_number(7).hash));
+        assert_eq!(instance(b"garbage is carried without a key"), None);
     }
 
     #[test]

@@ -109,13 +109,19 @@ fn a_forbidden_call_is_answered_with_the_reason_and_a_rule_permits_it() {
 #[test]
 fn without_a_bus_the_exit_code_says_so() {
     let locator = format!("tcp/127.0.0.1:{}", free_port());
-    for command in
-        [&["call", "eid400sid1", "--ping"][..], &["fleet"], &["pub", "a.B", "--text", "x"], &["sub"]]
-    {
+    let fails = |command: &[&str]| {
         let done = aldis(command.iter().copied().chain(["--connect", &locator]));
         assert_eq!(done.code, Some(5), "{command:?}: {done:?}");
         assert!(done.stderr.contains(&locator) && done.stdout.is_empty(), "{command:?}: {done:?}");
-    }
+    };
+    let commands =
+        [&["call", "eid400sid1", "--ping"][..], &["fleet"], &["pub", "a.B", "--text", "x"], &["sub"]];
+    // All at once, because each waits as long as it may.
+    std::thread::scope(|scope| {
+        for command in &commands {
+            scope.spawn(|| fails(command));
+        }
+    });
 }
 
 #[test]

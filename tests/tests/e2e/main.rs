@@ -1,5 +1,7 @@
 //! End to end: nodes as real processes, real sockets, real signals. Each test has its own nodes, ports and directory.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by a panic, in its helpers too")]
+
 mod access;
 mod calls;
 mod foreign;

@@ -24,8 +24,8 @@ fn every_message_comes_back_as_the_same_bytes() {
 #[test]
 fn a_header_tells_the_type() {
     for message in golden_messages() {
-        let object = decode(&message).unwrap();
-        let info = Header::peek(&message).unwrap().type_info().unwrap();
+        let object = decode(message).unwrap();
+        let info = Header::peek(message).unwrap().type_info().unwrap();
         assert_eq!(info, object.type_info());
         assert_eq!(type_of(info.full_name), Some(info));
     }
@@ -35,15 +35,15 @@ fn a_header_tells_the_type() {
 fn a_natural_key_is_the_field_that_the_table_names() {
     let mut keyed = 0;
     for message in golden_messages() {
-        let object = decode(&message).unwrap();
+        let object = decode(message).unwrap();
         let info = object.type_info();
         let Some(crate::lmcp::View::Int64(key)) = key_of(info).and_then(|key| object.view(key.field)) else {
-            assert_eq!(natural_key(info.full_name, &message), None, "{info}");
+            assert_eq!(natural_key(info.full_name, message), None, "{info}");
             continue;
         };
         keyed += 1;
-        assert_eq!(natural_key(info.full_name, &message), Some(key), "{info}");
-        assert_eq!(natural_key("afrl.cmasi.Other", &message), None);
+        assert_eq!(natural_key(info.full_name, message), Some(key), "{info}");
+        assert_eq!(natural_key("afrl.cmasi.Other", message), None);
     }
     let declared = types().filter(|info| key_of(info).is_some()).count();
     assert!(keyed == declared || golden_messages().is_empty(), "{keyed} of {declared}");
@@ -52,10 +52,10 @@ fn a_natural_key_is_the_field_that_the_table_names() {
 #[test]
 fn a_position_is_read_from_states_alone() {
     for message in golden_messages() {
-        let object = decode(&message).unwrap();
+        let object = decode(message).unwrap();
         let state = object.get::<crate::lmcp::cmasi::EntityState>();
         let expected = state.and_then(|state| state.location.get()).map(|place| place.latitude);
-        assert_eq!(position(&message).map(|position| position.latitude), expected);
+        assert_eq!(position(message).map(|position| position.latitude), expected);
     }
 }
 

@@ -77,7 +77,7 @@ proptest! {
     ) {
         let messages = golden_messages();
         if !messages.is_empty() {
-            let mut message = pick.get(&messages).clone();
+            let mut message = pick.get(messages).clone();
             for (place, value) in wrongs {
                 let place = place.index(message.len());
                 message[place] = value;
@@ -166,7 +166,7 @@ fn nulls_do_not_multiply_memory() {
         let waypoint_list = vec![Ref::NULL; count];
         encode(&MissionCommand { waypoint_list, ..MissionCommand::default() }).unwrap()
     };
-    assert!(decode(&with_nulls(100)).is_ok());
+    assert!(decode(&with_nulls(20)).is_ok());
     assert_eq!(fault(&with_nulls(60_000)).0, DecodeFault::Memory);
 }
 

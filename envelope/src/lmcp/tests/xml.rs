@@ -81,9 +81,9 @@ fn a_recorded_mission_is_read_stably() {
 #[test]
 fn every_type_goes_through_xml() {
     for message in golden_messages() {
-        let object = decode(&message).unwrap();
+        let object = decode(message).unwrap();
         let again = read_one(&to_xml(object.as_ref()).unwrap());
-        assert_eq!(encode(again.as_ref()).unwrap(), message);
+        assert_eq!(encode(again.as_ref()).unwrap(), *message);
     }
 }
 
@@ -125,6 +125,7 @@ fn a_document_that_is_not_well_formed_tells_the_line() {
     assert_eq!(fault(b"<a/>\n\n<b/>"), (3, XmlFault::Junk));
     assert_eq!(fault(b"<a/>\n\nb"), (3, XmlFault::Junk));
     assert_eq!(fault(b"\n<!-- a\n<!-- b --><a/>"), (3, XmlFault::Comment));
+    assert_eq!(fault(b"<!-- a\n---><a/>"), (2, XmlFault::Comment));
     assert_eq!(fault(b"<a>\n&b;</a>"), (2, XmlFault::Entity("b".into())));
     assert_eq!(fault(b"<a>\n\xff</a>"), (2, XmlFault::Encoding));
     assert_eq!(fault(b"\n"), (2, XmlFault::NoRoot));
@@ -147,8 +148,8 @@ fn texts_come_back_with_blanks_and_markup() {
 #[test]
 fn blanks_around_a_text_are_no_part_of_it() {
     let request = read_one(
-        "<AutomationRequest Series='CMASI'><TaskRelationships>\n  p(1 <!-- or --> 2)&#32;\n</TaskRelationships>\
-         </AutomationRequest>",
+        "<AutomationRequest Series='CMASI'><TaskRelationships>\n  p(1 <!-- or --> 2)&#32;\n\
+         </TaskRelationships></AutomationRequest>",
     );
     let request: &AutomationRequest = request.get().unwrap();
     assert_eq!(request.task_relationships, "p(1  2) ");

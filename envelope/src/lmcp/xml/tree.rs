@@ -165,10 +165,7 @@ impl Builder<'_> {
             }
             Event::CData(text) => self.on_text(start, &text.xml10_content(), Element::keep_text),
             Event::GeneralRef(reference) => self.on_reference(start, reference),
-            Event::Comment(text) => match text.find("--") {
-                Some(place) => self.fail(start + "<!--".len() + place, XmlFault::Comment),
-                None => Ok(()),
-            },
+            Event::Comment(text) => self.on_comment(start, text),
             Event::Decl(_) | Event::PI(_) | Event::DocType(_) | Event::Eof => Ok(()),
         }
     }
@@ -219,6 +216,15 @@ impl Builder<'_> {
             }
         }
         Ok(())
+    }
+
+    /// A comment holds no two hyphens, those that end it included.
+    fn on_comment(&mut self, start: usize, text: &str) -> Result<(), XmlError> {
+        let hyphens = text.find("--").or_else(|| text.ends_with('-').then_some(text.len()));
+        match hyphens {
+            Some(place) => self.fail(start + "<!--".len() + place, XmlFault::Comment),
+            None => Ok(()),
+        }
     }
 
     fn on_reference(&mut self, start: usize, reference: &BytesRef<'_>) -> Result<(), XmlError> {

@@ -67,6 +67,11 @@ impl Peers {
         }
     }
 
+    /// Whether anything is prepared.
+    pub(crate) fn has_output(&self) -> bool {
+        !self.dirty.is_empty()
+    }
+
     /// Writes what was prepared. Tells the node what credit came back.
     pub(crate) fn flush(&mut self, events: &mut Vec<Event>) {
         for (bridge, id) in self.dirty.drain(..) {

@@ -1,0 +1,223 @@
+//! The node: from the outbox of a service in one process to the handler of a service in another.
+
+use super::{BusBench, LAST, PATIENCE, Side, configuration, content, ended};
+use crate::cli::exit::Failure;
+use crate::cli::member::{Desk, Member, desk_service};
+use crate::runtime;
+use aldis_envelope::{
+    ContentType, EntityId, Label, Message, Monotonic, Name, Now, Prefix, ServiceId, Source,
+};
+use aldis_services::{Input, Outbox};
+use bytes::Bytes;
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::time::{Duration, Instant};
+
+/// How many messages the sending service puts into its outbox at once.
+const BATCH: u64 = 256;
+/// How often the sending service looks for something to do.
+const LOOK_EVERY: Duration = Duration::from_millis(1);
+
+fn source(entity: u64) -> Result<Source, Failure> {
+    let ids = EntityId::new(entity).and_then(|e| ServiceId::new(100).map(|s| Source::new(e, s)));
+    ids.map_err(|why| Failure::Failed(why.to_string()))
+}
+
+fn label(name: &str, from: Source) -> Result<Arc<Label>, Failure> {
+    let name = Name::new(name).map_err(|why| Failure::Failed(why.to_string()))?;
+    Ok(Arc::new(Label::broadcast(ContentType::Cdr, name, from)))
+}
+
+fn member<D: Desk + 'static>(entity: u64, bus: &str, prefix: &str, desk: D) -> Result<Member, Failure> {
+    let config = configuration(entity, bus)?;
+    let outside = runtime::outside(&config).map_err(|why| Failure::Failed(why.to_string()))?;
+    let mut node = runtime::node_config(&config);
+    let prefix = Prefix::new(prefix).map_err(|why| Failure::Failed(why.to_string()))?;
+    node.services.push(desk_service(source(entity)?, vec![prefix], desk));
+    Member::start(node, outside)
+}
+
+/// What the sending service is to do.
+enum Task {
+    Load(Bytes, Bytes, u64),
+    Trips(Bytes, u64),
+}
+
+enum Told {
+    Done(u64),
+    Trips(Vec<Duration>),
+}
+
+/// The sending service.
+struct SenderDesk {
+    load: Arc<Label>,
+    ping: Arc<Label>,
+    tasks: Arc<Mutex<Option<Task>>>,
+    tell: mpsc::Sender<Told>,
+    task: Option<Task>,
+    trips: Vec<Duration>,
+    started: Instant,
+    next: Option<Monotonic>,
+}
+
+impl Desk for SenderDesk {
+    fn take(&mut self, now: Now, input: Input<'_>, out: &mut Outbox) {
+        match input {
+            Input::Started => self.next = Some(now.monotonic + LOOK_EVERY),
+            Input::Deadline => self.work(now, out),
+            Input::Message(envelope) if envelope.message.label.descriptor() == "bench.to.1.Pong" => {
+                self.pong(now, out)
+            }
+            Input::Message(envelope) => {
+                let seen = envelope.message.content.as_ref().try_into().map(u64::from_le_bytes);
+                let _ = self.tell.send(Told::Done(seen.unwrap_or_default()));
+            }
+            _ => {}
+        }
+    }
+
+    fn next_deadline(&self) -> Option<Monotonic> {
+        self.next
+    }
+}
+
+impl SenderDesk {
+    fn work(&mut self, now: Now, out: &mut Outbox) {
+        self.next = Some(now.monotonic + LOOK_EVERY);
+        if self.task.is_none() {
+            self.task = self.tasks.lock().unwrap_or_else(PoisonError::into_inner).take();
+            if let Some(Task::Trips(content, _)) = &self.task {
+                self.started = Instant::now();
+                out.send(Message::new(self.ping.clone(), content.clone()));
+                self.next = None;
+                return;
+            }
+        }
+        let Some(Task::Load(usual, last, left)) = &mut self.task else { return };
+        let batch = BATCH.min(*left);
+        *left -= batch;
+        for _ in 1..batch {
+            out.send(Message::new(self.load.clone(), usual.clone()));
+        }
+        let end = if *left == 0 { last } else { usual };
+        out.send(Message::new(self.load.clone(), end.clone()));
+        self.next = Some(now.monotonic);
+        if *left == 0 {
+            self.task = None;
+            self.next = Some(now.monotonic + LOOK_EVERY);
+        }
+    }
+
+    fn pong(&mut self, now: Now, out: &mut Outbox) {
+        let Some(Task::Trips(content, left)) = &mut self.task else { return };
+        self.trips.push(self.started.elapsed());
+        *left -= 1;
+        if *left > 0 {
+            self.started = Instant::now();
+            out.send(Message::new(self.ping.clone(), content.clone()));
+        } else {
+            self.task = None;
+            self.next = Some(now.monotonic + LOOK_EVERY);
+            let _ = self.tell.send(Told::Trips(std::mem::take(&mut self.trips)));
+        }
+    }
+}
+
+/// The sending side.
+pub(super) struct Sender {
+    member: Option<Member>,
+    tasks: Arc<Mutex<Option<Task>>>,
+    told: mpsc::Receiver<Told>,
+}
+
+impl Sender {
+    pub(super) fn listen(locator: &str) -> Result<Self, Failure> {
+        let (tell, told) = mpsc::channel();
+        let tasks = Arc::new(Mutex::new(None));
+        let desk = SenderDesk {
+            load: label("bench.to.2.Load", source(1)?)?,
+            ping: label("bench.to.2.Ping", source(1)?)?,
+            tasks: tasks.clone(),
+            tell,
+            task: None,
+            trips: Vec::new(),
+            started: Instant::now(),
+            next: None,
+        };
+        let member = member(1, &format!("listen = [\"{locator}\"]"), "bench.to.1", desk)?;
+        Ok(Self { member: Some(member), tasks, told })
+    }
+
+    /// Sends pings until one is answered.
+    pub(super) fn wait_for_peer(&mut self) -> Result<(), Failure> {
+        let until = Instant::now() + PATIENCE;
+        while Instant::now() < until {
+            self.ask(Task::Load(content(100, true), content(100, true), 1));
+            if self.told.recv_timeout(Duration::from_millis(100)).is_ok() {
+                while self.told.recv_timeout(Duration::from_millis(100)).is_ok() {}
+                return Ok(());
+            }
+        }
+        Err(ended(()))
+    }
+
+    fn ask(&self, task: Task) {
+        *self.tasks.lock().unwrap_or_else(PoisonError::into_inner) = Some(task);
+    }
+
+    pub(super) fn leave(mut self) -> Result<(), Failure> {
+        self.member.take().map_or(Ok(()), Member::leave)
+    }
+}
+
+impl Side for Sender {
+    fn load(&mut self, size: usize, messages: u64) -> Result<(Duration, u64), Failure> {
+        let start = Instant::now();
+        self.ask(Task::Load(content(size, false), content(size, true), messages));
+        match self.told.recv_timeout(PATIENCE).map_err(ended)? {
+            Told::Done(seen) => Ok((start.elapsed(), seen)),
+            Told::Trips(_) => Err(ended(())),
+        }
+    }
+
+    fn round_trips(&mut self, size: usize, count: u64) -> Result<Vec<Duration>, Failure> {
+        self.ask(Task::Trips(content(size, false), count));
+        match self.told.recv_timeout(PATIENCE).map_err(ended)? {
+            Told::Trips(trips) => Ok(trips),
+            Told::Done(_) => Err(ended(())),
+        }
+    }
+}
+
+/// The far service: counts, and answers.
+struct SinkDesk {
+    done: Arc<Label>,
+    pong: Arc<Label>,
+    seen: u64,
+}
+
+impl Desk for SinkDesk {
+    fn take(&mut self, _: Now, input: Input<'_>, out: &mut Outbox) {
+        let Input::Message(envelope) = input else { return };
+        let message = &envelope.message;
+        if message.label.descriptor() == "bench.to.2.Ping" {
+            out.send(Message::new(self.pong.clone(), message.content.clone()));
+            return;
+        }
+        self.seen += 1;
+        if message.content.first() == Some(&LAST) {
+            let seen = std::mem::take(&mut self.seen).to_le_bytes();
+            out.send(Message::new(self.done.clone(), Bytes::copy_from_slice(&seen)));
+        }
+    }
+}
+
+/// The far side, until it is killed.
+pub(super) fn serve(connect: &str) -> Result<(), Failure> {
+    let desk = SinkDesk {
+        done: label("bench.to.1.Done", source(2)?)?,
+        pong: label("bench.to.1.Pong", source(2)?)?,
+        seen: 0,
+    };
+    let _member = member(2, &format!("connect = [\"{connect}\"]"), "bench.to.2", desk)?;
+    BusBench::serve_until_killed()
+}

@@ -1,0 +1,124 @@
+//! `aldis demo`: a shore station and three boats in one process, each with a Zenoh session of its own.
+
+mod board;
+mod fleet;
+mod screen;
+mod shore;
+
+use super::exit::Failure;
+use super::print_line;
+use super::telemetry;
+use crate::config::{Level, Log, LogFormat};
+use crate::runtime::Control;
+use board::Board;
+use fleet::{Fleet, SILENCED};
+use serde_json::json;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+use tokio::sync::mpsc;
+
+/// How often the table is drawn anew.
+const DRAW_EVERY: Duration = Duration::from_millis(500);
+/// Boat 403 is silenced from 40 % to 60 % of each turn.
+const TURN: Duration = Duration::from_secs(20);
+/// How long after the demo's first message the clock starts, at the latest.
+const READY_WITHIN: Duration = Duration::from_secs(10);
+
+/// A shore station and three boats in one process, each with a Zenoh session of its own.
+///
+/// The boats move along simple tracks and tell where they are (LMCP) and how they do (UMAA HealthReport); shore calls
+/// them each second; boat 403 is silenced for a while and comes back.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  aldis demo\n  aldis demo --headless --seconds 15 --json")]
+pub(crate) struct Demo {
+    /// No table: only the result at the end.
+    #[arg(long)]
+    headless: bool,
+    /// How long. Default: until it is stopped (SIGINT or SIGTERM); with `--headless` 15.
+    #[arg(long)]
+    seconds: Option<u64>,
+    /// The result as one JSON object, the last line.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Demo {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        telemetry::start(&Log { level: Level::Error, format: LogFormat::Text });
+        let seconds = self.seconds.or(self.headless.then_some(15)).map(Duration::from_secs);
+        let board = Arc::new(Mutex::new(Board::default()));
+        let fleet = Fleet::start(&board)?;
+        let (stop, stopped) = mpsc::unbounded_channel();
+        super::run::watch_signals(stop)?;
+        let ran = self.play(&fleet, &board, seconds, stopped);
+        let statuses = fleet.statuses(READY_WITHIN)?;
+        fleet.leave()?;
+        let board = board.lock().unwrap_or_else(PoisonError::into_inner);
+        self.report(&board.result(&statuses, ran))
+    }
+
+    /// Lets the demo run: draws the table, silences a boat and lets it come back. Returns how long it ran.
+    fn play(
+        &self,
+        fleet: &Fleet,
+        board: &Arc<Mutex<Board>>,
+        seconds: Option<Duration>,
+        mut stopped: mpsc::UnboundedReceiver<Control>,
+    ) -> Duration {
+        let start = Instant::now();
+        let turn = seconds.unwrap_or(TURN);
+        let mut silent = false;
+        loop {
+            let ran = start.elapsed();
+            if seconds.is_some_and(|seconds| ran >= seconds) || stopped.try_recv().is_ok() {
+                fleet.silence(false);
+                return ran;
+            }
+            let phase = (ran.as_secs_f64() / turn.as_secs_f64()).fract();
+            let wanted = (0.4..0.6).contains(&phase);
+            if wanted != silent {
+                silent = wanted;
+                fleet.silence(silent);
+            }
+            let mut board = board.lock().unwrap_or_else(PoisonError::into_inner);
+            board.silenced = silent.then_some(SILENCED);
+            if !self.headless {
+                screen::draw(&mut board, ran);
+            }
+            drop(board);
+            let left = seconds.map_or(DRAW_EVERY, |seconds| seconds.saturating_sub(ran));
+            // The only thing to wait for is the next picture: a deadline, cut short by a signal.
+            let until = Instant::now() + left.min(DRAW_EVERY);
+            while Instant::now() < until && stopped.is_empty() && !stopped.is_closed() {
+                std::thread::park_timeout(Duration::from_millis(50));
+            }
+        }
+    }
+
+    fn report(&self, result: &board::Outcome) -> Result<(), Failure> {
+        let object = json!({
+            "entities": result.entities,
+            "envelopes_delivered": result.delivered,
+            "envelopes_lost": result.lost,
+            "skipped_told": result.skipped_told,
+            "calls_ok": result.calls_ok,
+            "calls_failed": result.calls_failed,
+            "calls_failed_elsewhere": result.calls_failed_elsewhere,
+            "silenced": SILENCED,
+            "seconds": result.ran.as_secs_f64().round(),
+        });
+        if self.json {
+            print_line(object);
+        } else {
+            print_line(format_args!("{object:#}"));
+        }
+        if result.lost > 0 {
+            return Err(Failure::Failed(format!("{} envelopes were lost", result.lost)));
+        }
+        if result.calls_failed_elsewhere > 0 {
+            let count = result.calls_failed_elsewhere;
+            return Err(Failure::Failed(format!("{count} calls to boats that were not silenced failed")));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,70 @@
+//! What shore knows of the fleet: the numbers behind the table and the result.
+
+use aldis_envelope::aldis::NodeStatus;
+use aldis_envelope::umaa::ErrorCondition;
+use aldis_envelope::{EntityId, Monotonic};
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// What shore knows of one boat.
+#[derive(Debug, Default)]
+pub(super) struct Boat {
+    pub(super) heard: Option<Monotonic>,
+    pub(super) states: u64,
+    /// States at the last drawing, and when that was: for the rate.
+    pub(super) drawn: (u64, Duration),
+    pub(super) rate: f64,
+    pub(super) latitude: f64,
+    pub(super) longitude: f64,
+    pub(super) reports: u64,
+    pub(super) worst: Option<ErrorCondition>,
+    pub(super) calls_ok: u64,
+    pub(super) calls_failed: u64,
+    pub(super) round_trip: Option<Duration>,
+    pub(super) last_failure: String,
+}
+
+/// What shore knows.
+#[derive(Debug, Default)]
+pub(super) struct Board {
+    pub(super) now: Monotonic,
+    pub(super) boats: BTreeMap<EntityId, Boat>,
+    /// The boat that is silenced now.
+    pub(super) silenced: Option<u64>,
+    /// Calls that failed though the boat was not silenced when they were made.
+    pub(super) failed_elsewhere: u64,
+}
+
+/// How the demo went.
+#[derive(Debug)]
+pub(super) struct Outcome {
+    pub(super) entities: usize,
+    pub(super) delivered: u64,
+    pub(super) lost: u64,
+    pub(super) skipped_told: u64,
+    pub(super) calls_ok: u64,
+    pub(super) calls_failed: u64,
+    pub(super) calls_failed_elsewhere: u64,
+    pub(super) ran: Duration,
+}
+
+impl Board {
+    /// The result, from what shore saw and what the nodes counted.
+    pub(super) fn result(&self, statuses: &[NodeStatus], ran: Duration) -> Outcome {
+        let counted = |name: &str| {
+            let of =
+                |status: &NodeStatus| status.counters.iter().find(|(n, _)| n == name).map_or(0, |(_, v)| *v);
+            statuses.iter().map(of).sum()
+        };
+        Outcome {
+            entities: statuses.len(),
+            delivered: counted("delivered"),
+            lost: counted("lost") + counted("shed_from_bus"),
+            skipped_told: counted("skipped_told"),
+            calls_ok: self.boats.values().map(|boat| boat.calls_ok).sum(),
+            calls_failed: self.boats.values().map(|boat| boat.calls_failed).sum(),
+            calls_failed_elsewhere: self.failed_elsewhere,
+            ran,
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! The nodes of the demo.
+
+use super::board::Board;
+use super::shore::ShoreDesk;
+use crate::cli::exit::Failure;
+use crate::cli::member::{Member, desk_service};
+use crate::config::Config;
+use crate::runtime::{self, Control};
+use aldis_envelope::aldis::NodeStatus;
+use aldis_envelope::umaa::{HealthReport, Topic};
+use aldis_envelope::{EntityId, Prefix, ServiceId, Source};
+use aldis_services::{ServiceSpec, track};
+use std::net::TcpListener;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, mpsc};
+use std::time::Duration;
+
+/// The boats.
+pub(super) const BOATS: [u64; 3] = [401, 402, 403];
+/// The one that is silenced for a while.
+pub(super) const SILENCED: u64 = 403;
+
+/// The running fleet.
+pub(super) struct Fleet {
+    shore: Member,
+    boats: Vec<Member>,
+    finish: Arc<AtomicBool>,
+    statuses: mpsc::Receiver<Vec<NodeStatus>>,
+}
+
+fn failed<E: std::fmt::Display>(why: E) -> Failure {
+    Failure::Failed(why.to_string())
+}
+
+impl Fleet {
+    /// Starts shore, then the boats.
+    pub(super) fn start(board: &Arc<Mutex<Board>>) -> Result<Self, Failure> {
+        let port = TcpListener::bind("127.0.0.1:0")
+            .and_then(|listener| listener.local_addr())
+            .map_err(failed)?
+            .port();
+        let (tell, statuses) = mpsc::channel();
+        let finish = Arc::new(AtomicBool::new(false));
+        let boats = BOATS.map(EntityId::new).into_iter().collect::<Result<Vec<_>, _>>().map_err(failed)?;
+        let desk = ShoreDesk::new(board.clone(), boats, finish.clone(), tell);
+        let entity = EntityId::new(1).map_err(failed)?;
+        let source = Source::new(entity, ServiceId::new(100).map_err(failed)?);
+        let prefixes = [track::DESCRIPTOR, HealthReport::NAME].map(Prefix::new);
+        let prefixes = prefixes.into_iter().collect::<Result<Vec<_>, _>>().map_err(failed)?;
+        let desk = desk_service(source, prefixes, desk);
+        let shore = start(&shore_text(port), Some(desk))?;
+        let boats =
+            BOATS.iter().map(|&boat| start(&boat_text(boat, port), None)).collect::<Result<_, _>>()?;
+        Ok(Self { shore, boats, finish, statuses })
+    }
+
+    /// Silences the boat, or lets it come back.
+    pub(super) fn silence(&self, silent: bool) {
+        let boat = BOATS.iter().position(|&boat| boat == SILENCED);
+        if let Some(member) = boat.and_then(|boat| self.boats.get(boat)) {
+            // A node that has ended is as silent as can be.
+            let _ = member.control().send(Control::Silence(silent));
+        }
+    }
+
+    /// What every node says of itself at the end.
+    pub(super) fn statuses(&self, within: Duration) -> Result<Vec<NodeStatus>, Failure> {
+        self.finish.store(true, Ordering::Relaxed);
+        self.statuses
+            .recv_timeout(within)
+            .map_err(|_| Failure::Failed("the nodes do not tell their status".into()))
+    }
+
+    /// Ends all nodes, the boats first.
+    pub(super) fn leave(self) -> Result<(), Failure> {
+        self.boats.into_iter().try_for_each(Member::leave)?;
+        self.shore.leave()
+    }
+}
+
+fn start(text: &str, desk: Option<ServiceSpec>) -> Result<Member, Failure> {
+    let config = Config::parse("demo", text)?;
+    let outside = runtime::outside(&config).map_err(failed)?;
+    let mut node = runtime::node_config(&config);
+    node.services.extend(desk);
+    Member::start(node, outside)
+}
+
+fn shore_text(port: u16) -> String {
+    format!(
+        "name = \"shore\"\nfleet = \"demo\"\nentities = [1]\n[bus]\nmode = \"router\"\n\
+         listen = [\"tcp/127.0.0.1:{port}\"]\n[health]\nreport_period_ms = 1000\n"
+    )
+}
+
+/// Boats go round in circles of different size and speed, off Narragansett Bay.
+fn boat_text(boat: u64, port: u16) -> String {
+    let place = (boat - 400) as f64;
+    format!(
+        "name = \"boat-{boat}\"\nfleet = \"demo\"\nentities = [{boat}]\noperators = [1]\n\
+         [bus]\nmode = \"client\"\nconnect = [\"tcp/127.0.0.1:{port}\"]\n[health]\nreport_period_ms = 1000\n\
+         [[service]]\nkind = \"track\"\nservice = 100\nlatitude_deg = {:.4}\nlongitude_deg = -71.35\n\
+         speed_m_per_s = {:.1}\nturn_rate_deg_per_s = {:.1}\nrate_hz = 10.0\n",
+        41.40 + place * 0.02,
+        4.0 + place * 2.0,
+        place - 2.0,
+    )
+}
