@@ -28,14 +28,12 @@ pub fn program() -> &'static PathBuf {
         // of them would be built a second time.
         cargo.args(["build", "--quiet", "--offline", "--workspace", "--bin", "aldis", "--examples"]);
         cargo.args(["--profile", profile, "--target-dir"]).arg(target).current_dir(root());
-        // The build scripts of some dependencies look at what cargo says of the package under test: with it, they and
-        // all that stands on them would be built anew, here and at the next `cargo test`.
-        let of_the_package =
-            |name: &str| name.starts_with("CARGO_PKG_") || name.starts_with("CARGO_MANIFEST_");
-        for (name, _) in std::env::vars_os() {
-            if name.to_str().is_some_and(of_the_package) {
-                cargo.env_remove(name);
-            }
+        // Cargo tells a test about its package. Build scripts that look at that (ring's does) would run again, and what
+        // hangs on them, here and in the next `cargo test`.
+        let of_this_package =
+            |name: &String| name.starts_with("CARGO_MANIFEST_") || name.starts_with("CARGO_PKG_");
+        for name in std::env::vars().map(|(name, _)| name).filter(of_this_package) {
+            cargo.env_remove(name);
         }
         let built = cargo.status().expect("cargo runs");
         assert!(built.success(), "the program cannot be built: {cargo:?}");

@@ -1,5 +1,6 @@
 //! Foreign peers in Python: an interpreter of a virtual environment under `target/`, with the packages wanted.
 
+use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -56,14 +57,19 @@ fn found_or_skipped(peer: &str, found: Result<PathBuf, String>) -> Option<PathBu
     }
 }
 
-/// Made under a name of its own and then renamed: of several tests that make it at once one wins, and none ever sees
-/// half of it.
+/// Sought once in a process, found or not: where the network is absent, each attempt takes its time.
 fn environment(packages: &[&str]) -> Result<PathBuf, String> {
-    // Of the tests in one process the others wait.
-    static MAKING: Mutex<()> = Mutex::new(());
-    let _making = MAKING.lock().unwrap_or_else(PoisonError::into_inner);
+    static SOUGHT: Mutex<BTreeMap<String, Result<PathBuf, String>>> = Mutex::new(BTreeMap::new());
+    let mut sought = SOUGHT.lock().unwrap_or_else(PoisonError::into_inner);
+    let name = packages.join("+");
+    sought.entry(name).or_insert_with_key(|name| kept_or_made(name, packages)).clone()
+}
+
+/// Made under a name of its own and then renamed: of several processes that make it at once one wins, and none ever
+/// sees half of it.
+fn kept_or_made(name: &str, packages: &[&str]) -> Result<PathBuf, String> {
     let peers = target_directory().join("python");
-    let place = peers.join(packages.join("+"));
+    let place = peers.join(name);
     let python = |place: &Path| place.join("bin").join("python");
     if python(&place).exists() {
         return Ok(python(&place));
