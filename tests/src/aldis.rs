@@ -35,8 +35,9 @@ pub fn program() -> &'static PathBuf {
         for name in std::env::vars().map(|(name, _)| name).filter(of_this_package) {
             cargo.env_remove(name);
         }
-        let built = cargo.status().expect("cargo runs");
-        assert!(built.success(), "the program cannot be built: {cargo:?}");
+        let built = cargo.output().expect("cargo runs");
+        let said = String::from_utf8_lossy(&built.stderr);
+        assert!(built.status.success(), "the program cannot be built: {cargo:?}\n{said}");
         directory.join(format!("aldis{}", std::env::consts::EXE_SUFFIX))
     })
 }
