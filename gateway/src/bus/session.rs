@@ -201,13 +201,17 @@ impl Bus {
         Ok(())
     }
 
-    /// Declares keys of others, seen for the first time: Zenoh caches routes for declared keys alone.
+    /// Declares keys of others, seen for the first time: Zenoh caches routes for declared keys alone. A subscriber that comes
+    /// and goes at once makes their senders know a number for the key, which then travels in place of its text.
     pub(crate) fn declare_learned(&mut self, keys: Vec<String>) {
         for key in keys {
             if self.learned.len() >= KEYS_DECLARED_MAX {
                 return;
             }
             if let Ok(declared) = self.session.declare_keyexpr(key).wait() {
+                let passing = self.session.declare_subscriber(declared.clone()).callback(drop).wait();
+                // Without the number the key travels as text, which is slower and nothing else.
+                let _ = passing.map(|passing| passing.undeclare().wait());
                 self.learned.push(declared);
             }
         }

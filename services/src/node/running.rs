@@ -95,6 +95,8 @@ impl Node {
             let text =
                 format!("more than {WORK_MAX} messages wait inside the node: those of {source} are dropped");
             self.say(now, Level::Error, "shed inside", text, effects);
+        } else if self.work.is_empty() {
+            self.route(now, Origin::Service(place), message, effects);
         } else {
             self.work.push_back((Origin::Service(place), message));
         }

@@ -2,12 +2,12 @@
 
 use super::{BusBench, LAST, PATIENCE, Side, configuration, content, ended};
 use crate::cli::exit::Failure;
-use crate::cli::member::{Desk, Member, desk_service};
+use crate::cli::member::Member;
 use crate::runtime;
 use aldis_envelope::{
     ContentType, EntityId, Label, Message, Monotonic, Name, Now, Prefix, ServiceId, Source,
 };
-use aldis_services::{Input, Outbox};
+use aldis_services::{Input, Outbox, Service, ServiceSpec};
 use bytes::Bytes;
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::time::{Duration, Instant};
@@ -27,12 +27,20 @@ fn label(name: &str, from: Source) -> Result<Arc<Label>, Failure> {
     Ok(Arc::new(Label::broadcast(ContentType::Cdr, name, from)))
 }
 
-fn member<D: Desk + 'static>(entity: u64, bus: &str, prefix: &str, desk: D) -> Result<Member, Failure> {
+/// A node whose service is made once: it is not expected to crash.
+fn member(
+    entity: u64,
+    bus: &str,
+    make: impl Fn() -> Box<dyn Service> + Send + Sync + 'static,
+) -> Result<Member, Failure> {
     let config = configuration(entity, bus)?;
     let outside = runtime::outside(&config).map_err(|why| Failure::Failed(why.to_string()))?;
     let mut node = runtime::node_config(&config);
-    let prefix = Prefix::new(prefix).map_err(|why| Failure::Failed(why.to_string()))?;
-    node.services.push(desk_service(source(entity)?, vec![prefix], desk));
+    node.services.push(ServiceSpec {
+        source: source(entity)?,
+        name: "bench".into(),
+        factory: Arc::new(make),
+    });
     Member::start(node, outside)
 }
 
@@ -48,7 +56,7 @@ enum Told {
 }
 
 /// The sending service.
-struct SenderDesk {
+struct Sending {
     load: Arc<Label>,
     ping: Arc<Label>,
     tasks: Arc<Mutex<Option<Task>>>,
@@ -59,8 +67,12 @@ struct SenderDesk {
     next: Option<Monotonic>,
 }
 
-impl Desk for SenderDesk {
-    fn take(&mut self, now: Now, input: Input<'_>, out: &mut Outbox) {
+impl Service for Sending {
+    fn subscriptions(&self) -> Vec<Prefix> {
+        Prefix::new("bench.to.1").into_iter().collect()
+    }
+
+    fn handle(&mut self, now: Now, input: Input<'_>, out: &mut Outbox) {
         match input {
             Input::Started => self.next = Some(now.monotonic + LOOK_EVERY),
             Input::Deadline => self.work(now, out),
@@ -80,7 +92,7 @@ impl Desk for SenderDesk {
     }
 }
 
-impl SenderDesk {
+impl Sending {
     fn work(&mut self, now: Now, out: &mut Outbox) {
         self.next = Some(now.monotonic + LOOK_EVERY);
         if self.task.is_none() {
@@ -133,17 +145,21 @@ impl Sender {
     pub(super) fn listen(locator: &str) -> Result<Self, Failure> {
         let (tell, told) = mpsc::channel();
         let tasks = Arc::new(Mutex::new(None));
-        let desk = SenderDesk {
-            load: label("bench.to.2.Load", source(1)?)?,
-            ping: label("bench.to.2.Ping", source(1)?)?,
-            tasks: tasks.clone(),
-            tell,
-            task: None,
-            trips: Vec::new(),
-            started: Instant::now(),
-            next: None,
+        let (load, ping) = (label("bench.to.2.Load", source(1)?)?, label("bench.to.2.Ping", source(1)?)?);
+        let for_service = tasks.clone();
+        let make = move || -> Box<dyn Service> {
+            Box::new(Sending {
+                load: load.clone(),
+                ping: ping.clone(),
+                tasks: for_service.clone(),
+                tell: tell.clone(),
+                task: None,
+                trips: Vec::new(),
+                started: Instant::now(),
+                next: None,
+            })
         };
-        let member = member(1, &format!("listen = [\"{locator}\"]"), "bench.to.1", desk)?;
+        let member = member(1, &format!("listen = [\"{locator}\"]"), make)?;
         Ok(Self { member: Some(member), tasks, told })
     }
 
@@ -189,14 +205,18 @@ impl Side for Sender {
 }
 
 /// The far service: counts, and answers.
-struct SinkDesk {
+struct Sink {
     done: Arc<Label>,
     pong: Arc<Label>,
     seen: u64,
 }
 
-impl Desk for SinkDesk {
-    fn take(&mut self, _: Now, input: Input<'_>, out: &mut Outbox) {
+impl Service for Sink {
+    fn subscriptions(&self) -> Vec<Prefix> {
+        Prefix::new("bench.to.2").into_iter().collect()
+    }
+
+    fn handle(&mut self, _: Now, input: Input<'_>, out: &mut Outbox) {
         let Input::Message(envelope) = input else { return };
         let message = &envelope.message;
         if message.label.descriptor() == "bench.to.2.Ping" {
@@ -213,11 +233,9 @@ impl Desk for SinkDesk {
 
 /// The far side, until it is killed.
 pub(super) fn serve(connect: &str) -> Result<(), Failure> {
-    let desk = SinkDesk {
-        done: label("bench.to.1.Done", source(2)?)?,
-        pong: label("bench.to.1.Pong", source(2)?)?,
-        seen: 0,
-    };
-    let _member = member(2, &format!("connect = [\"{connect}\"]"), "bench.to.2", desk)?;
+    let (done, pong) = (label("bench.to.1.Done", source(2)?)?, label("bench.to.1.Pong", source(2)?)?);
+    let make =
+        move || -> Box<dyn Service> { Box::new(Sink { done: done.clone(), pong: pong.clone(), seen: 0 }) };
+    let _member = member(2, &format!("connect = [\"{connect}\"]"), make)?;
     BusBench::serve_until_killed()
 }
