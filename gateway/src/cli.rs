@@ -3,6 +3,7 @@
 mod bench;
 mod call;
 mod check;
+mod content;
 mod demo;
 mod exit;
 mod fleet;

@@ -29,7 +29,7 @@ pub(crate) use schema::schema;
 pub(crate) use service::Service;
 pub(crate) use text::PlainName;
 
-use aldis_envelope::{Fleet, Prefix};
+use aldis_envelope::{Fleet, GuidForm, Prefix};
 use error::Fault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -51,6 +51,10 @@ pub(crate) struct Config {
     /// Entities that may administer the node, besides its own. Default: none.
     #[serde(default)]
     pub(crate) operators: Operators,
+    /// How the GUIDs of the node's own services are made. Default: readable.
+    #[serde(default)]
+    #[schemars(with = "schema::GuidForm")]
+    pub(crate) guid: GuidForm,
     /// How the node joins the bus.
     #[serde(default)]
     pub(crate) bus: Bus,

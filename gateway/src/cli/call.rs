@@ -1,8 +1,8 @@
 //! `aldis call`: a request and its answers.
 
+use super::content::{content_text, content_type, descriptor, read_file};
 use super::exit::Failure;
 use super::member::{Desk, Join, Member};
-use super::messages::content_text;
 use super::print_line;
 use super::within::Within;
 use aldis_envelope::{Address, ContentType, Descriptor, Envelope, Monotonic, Now, Refusal, Role, aldis};
@@ -49,14 +49,6 @@ pub(crate) struct CallArgs {
     json: bool,
     #[command(flatten)]
     join: Join,
-}
-
-pub(super) fn descriptor(text: &str) -> Result<Descriptor, String> {
-    Descriptor::new(text).map_err(|why| why.to_string())
-}
-
-pub(super) fn content_type(text: &str) -> Result<ContentType, String> {
-    ContentType::new(text).map_err(|why| why.to_string())
 }
 
 /// What the desk tells the command.
@@ -118,7 +110,7 @@ impl CallArgs {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let content = match (&self.text, &self.file) {
             (Some(text), _) => Bytes::from(text.clone()),
-            (None, Some(file)) => super::messages::read_file(file)?,
+            (None, Some(file)) => read_file(file)?,
             (None, None) => Bytes::new(),
         };
         let request = if self.ping { descriptor(aldis::PING).ok() } else { self.request.clone() };

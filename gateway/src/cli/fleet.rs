@@ -1,8 +1,8 @@
 //! `aldis fleet`: who is there.
 
+use super::content::status_text;
 use super::exit::Failure;
 use super::member::{Desk, Join, Member};
-use super::messages::status_text;
 use super::print_line;
 use super::within::Within;
 use aldis_envelope::aldis::{self, NodeStatus};

@@ -69,6 +69,10 @@ described! {
         "description": "How ids are written: `eid400.sid37` (openuxas) or `eid400sid37` (slides).",
         "type": "string", "enum": ["openuxas", "slides"]
     };
+    GuidForm as "GuidForm" = {
+        "description": "How the GUIDs of own services are made: with the ids inside (readable), or from names (v5).",
+        "type": "string", "enum": ["readable", "v5"]
+    };
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use crate::bridge::uxas_tcp::{Endpoint, Side};
 use crate::bus::Congestion;
 use crate::clock;
 use crate::config::{self, Config, bus};
-use aldis_envelope::{EntityId, GuidForm, Guids, Source};
+use aldis_envelope::{EntityId, Guids, Source};
 use aldis_services::registry::{self, Kind};
 use aldis_services::{BridgeSpec, NodeConfig, ServiceSpec};
 
@@ -38,7 +38,7 @@ pub(crate) fn outside(config: &Config) -> Result<Outside, bus::BusError> {
 /// The node of a configuration, in a new life.
 pub(crate) fn node_config(config: &Config) -> NodeConfig {
     let own = config.entities.own();
-    let guids = Guids::new(&config.fleet, GuidForm::Readable);
+    let guids = Guids::new(&config.fleet, config.guid);
     let mut services = registry::built_in(own, &guids, config.health.report_period());
     services.extend(config.services.iter().map(|service| configured(own, service, &guids)));
     NodeConfig {

@@ -6,7 +6,7 @@ mod raw;
 use super::super::exit::Failure;
 use super::super::print_line;
 use super::child::{Process, free_port};
-use super::statistics::{median, percentile, rounded};
+use super::statistics::{median, paired, percentile, rounded};
 use crate::config::Config;
 use serde_json::json;
 use std::time::Duration;
@@ -138,11 +138,6 @@ impl BusBench {
         }
         Ok(figures)
     }
-}
-
-/// The median of the ratios of neighbouring rounds, so that a drift of the machine does not count.
-fn paired(of: &[f64], to: &[f64]) -> f64 {
-    median(&of.iter().zip(to).map(|(of, to)| of / to).collect::<Vec<_>>())
 }
 
 impl BusPeer {

@@ -20,6 +20,11 @@ pub(super) fn median(figures: &[f64]) -> f64 {
     }
 }
 
+/// The median of the ratios of neighbouring rounds, so that a drift of the machine does not count.
+pub(super) fn paired(of: &[f64], to: &[f64]) -> f64 {
+    median(&of.iter().zip(to).map(|(of, to)| of / to).collect::<Vec<_>>())
+}
+
 /// A figure with three digits behind the point.
 pub(super) fn rounded(figure: f64) -> f64 {
     (figure * 1e3).round() / 1e3

@@ -8,7 +8,7 @@ pub(super) use copy::TcpCopy;
 use super::super::exit::Failure;
 use super::super::print_line;
 use super::child::{Process, free_port};
-use super::statistics::{median, percentile, rounded};
+use super::statistics::{median, paired, percentile, rounded};
 use load::{Frames, Pair};
 use serde_json::json;
 use std::path::PathBuf;
@@ -150,9 +150,4 @@ impl UxasBench {
         }
         Ok(figures)
     }
-}
-
-/// The median of the ratios of neighbouring rounds, so that a drift of the machine does not count.
-fn paired(of: &[f64], to: &[f64]) -> f64 {
-    median(&of.iter().zip(to).map(|(of, to)| of / to).collect::<Vec<_>>())
 }

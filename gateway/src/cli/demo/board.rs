@@ -6,6 +6,11 @@ use aldis_envelope::{EntityId, Monotonic};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+/// The boats.
+pub(super) const BOATS: [u64; 3] = [401, 402, 403];
+/// The one that is silenced for a while.
+pub(super) const SILENCED: u64 = 403;
+
 /// What shore knows of one boat.
 #[derive(Debug, Default)]
 pub(super) struct Boat {

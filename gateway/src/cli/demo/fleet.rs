@@ -1,6 +1,6 @@
 //! The nodes of the demo.
 
-use super::board::Board;
+use super::board::{BOATS, Board, SILENCED};
 use super::shore::ShoreDesk;
 use crate::cli::exit::Failure;
 use crate::cli::member::{Member, desk_service};
@@ -14,11 +14,6 @@ use std::net::TcpListener;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;
-
-/// The boats.
-pub(super) const BOATS: [u64; 3] = [401, 402, 403];
-/// The one that is silenced for a while.
-pub(super) const SILENCED: u64 = 403;
 
 /// The running fleet.
 pub(super) struct Fleet {

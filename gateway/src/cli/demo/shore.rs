@@ -1,7 +1,6 @@
 //! The shore station's service: hears the boats, and calls them each second.
 
-use super::board::Board;
-use super::fleet::SILENCED;
+use super::board::{Board, SILENCED};
 use crate::cli::member::Desk;
 use aldis_envelope::aldis::{self, NodeStatus};
 use aldis_envelope::umaa::{self, ErrorCondition, HealthReport};

@@ -1,0 +1,72 @@
+//! Contents on the command line: what goes in, and what comes out for people and machines.
+
+use super::exit::Failure;
+use aldis_envelope::umaa::{self, HealthReport, LogReport, Topic};
+use aldis_envelope::{ContentType, Descriptor, Label, aldis};
+use bytes::Bytes;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// A descriptor as an argument.
+pub(super) fn descriptor(text: &str) -> Result<Descriptor, String> {
+    Descriptor::new(text).map_err(|why| why.to_string())
+}
+
+/// A content type as an argument.
+pub(super) fn content_type(text: &str) -> Result<ContentType, String> {
+    ContentType::new(text).map_err(|why| why.to_string())
+}
+
+/// A content for people and machines: read where its type is known, otherwise its bytes in hexadecimal.
+pub(super) fn content_text(label: &Label, content: &[u8]) -> Value {
+    let read = match (label.descriptor(), &label.attributes.content_type) {
+        (HealthReport::NAME, ContentType::Umaa) => {
+            umaa::decode::<HealthReport>(content).ok().map(|r| umaa_text(&r))
+        }
+        (LogReport::NAME, ContentType::Umaa) => umaa::decode::<LogReport>(content).ok().map(|r| log_text(&r)),
+        (aldis::NODE_STATUS, ContentType::Aldis) => {
+            aldis::decode::<aldis::NodeStatus>(content).map(|s| status_text(&s))
+        }
+        _ => None,
+    };
+    read.unwrap_or_else(|| json!({ "bytes": content.len(), "hex": hex(content) }))
+}
+
+fn umaa_text(report: &HealthReport) -> Value {
+    json!({
+        "source": report.source.to_string(), "resource_id": report.resource_id.to_string(),
+        "severity": report.severity, "code": report.code, "status": report.status,
+        "log_time": aldis_envelope::Wall::from(report.log_time).to_string(),
+        "time_stamp": aldis_envelope::Wall::from(report.time_stamp).to_string(),
+    })
+}
+
+fn log_text(report: &LogReport) -> Value {
+    json!({
+        "source": report.source.to_string(), "level": report.level, "entry": report.entry,
+        "time_stamp": aldis_envelope::Wall::from(report.time_stamp).to_string(),
+    })
+}
+
+/// A node's status for people and machines.
+pub(super) fn status_text(status: &aldis::NodeStatus) -> Value {
+    let counters: serde_json::Map<_, _> =
+        status.counters.iter().map(|(name, value)| (name.clone(), (*value).into())).collect();
+    json!({
+        "node": status.node, "entities": status.entities, "boot": status.boot, "uptime_ms": status.uptime_ms,
+        "services": status.services.iter().map(|service| json!({
+            "source": service.source.to_string(), "name": service.name, "state": service.state,
+        })).collect::<Vec<_>>(),
+        "counters": counters,
+    })
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// A content from a file.
+pub(super) fn read_file(path: &Path) -> Result<Bytes, Failure> {
+    let wrong = |why| Failure::Usage(format!("cannot read {}: {why}", path.display()));
+    std::fs::read(path).map(Bytes::from).map_err(wrong)
+}
