@@ -85,6 +85,7 @@ fn state() -> Result<Vec<u8>, Failure> {
 pub(super) struct Pair {
     sending: TcpStream,
     receiving: TcpStream,
+    buffer: Vec<u8>,
     at: usize,
 }
 
@@ -92,7 +93,7 @@ impl Pair {
     /// Connects both, and waits until a message passes.
     pub(super) fn connect(to: u16, from: u16, frames: &Frames) -> Result<Self, Failure> {
         let (receiving, sending) = (connect(from)?, connect(to)?);
-        let mut pair = Self { sending, receiving, at: 0 };
+        let mut pair = Self { sending, receiving, buffer: vec![0; 256 * 1024], at: 0 };
         let until = Instant::now() + PATIENCE;
         let mut sent = 0;
         pair.receiving.set_read_timeout(Some(Duration::from_millis(100))).map_err(failed("socket"))?;
@@ -142,12 +143,11 @@ impl Pair {
 
     /// Receives until so many frames came, or none comes for long.
     fn receive(&mut self, frames: &Frames, wanted: u64) -> Result<u64, Failure> {
-        let mut buffer = vec![0; 256 * 1024];
         let mut seen = 0;
         while seen < wanted {
-            match self.receiving.read(&mut buffer) {
+            match self.receiving.read(&mut self.buffer) {
                 Ok(0) => return Err(Failure::Failed("the connection was closed".into())),
-                Ok(count) => seen += frames.count(&buffer[..count], &mut self.at)?,
+                Ok(count) => seen += frames.count(&self.buffer[..count], &mut self.at)?,
                 Err(why) if matches!(why.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => break,
                 Err(why) => return Err(failed("receive")(why)),
             }
