@@ -21,8 +21,8 @@ use tokio::sync::mpsc;
 const DRAW_EVERY: Duration = Duration::from_millis(500);
 /// Boat 403 is silenced from 40 % to 60 % of each turn.
 const TURN: Duration = Duration::from_secs(20);
-/// How long after the demo's first message the clock starts, at the latest.
-const READY_WITHIN: Duration = Duration::from_secs(10);
+/// How long the nodes may take to tell their status at the end.
+const STATUS_WITHIN: Duration = Duration::from_secs(10);
 
 /// A shore station and three boats in one process, each with a Zenoh session of its own.
 ///
@@ -51,7 +51,7 @@ impl Demo {
         let (stop, stopped) = mpsc::unbounded_channel();
         super::run::watch_signals(stop)?;
         let ran = self.play(&fleet, &board, seconds, stopped);
-        let statuses = fleet.statuses(READY_WITHIN)?;
+        let statuses = fleet.statuses(STATUS_WITHIN)?;
         fleet.leave()?;
         let board = board.lock().unwrap_or_else(PoisonError::into_inner);
         self.report(&board.result(&statuses, ran))

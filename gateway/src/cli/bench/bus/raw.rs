@@ -37,7 +37,8 @@ fn put(publisher: &Publisher, content: Bytes) -> zenoh::Result<()> {
 
 /// The sending side.
 pub(super) struct Raw {
-    session: Session,
+    /// Kept open: all that is declared ends with it.
+    _session: Session,
     load: Publisher,
     ping: Publisher,
     done: mpsc::Receiver<u64>,
@@ -65,7 +66,7 @@ impl Raw {
             session.declare_subscriber(PONG).callback(on_pong).wait().map_err(failed)?,
         ];
         let (load, ping) = (publisher(&session, LOAD)?, publisher(&session, PING)?);
-        Ok(Self { session, load, ping, done, pong, _subscribers: subscribers })
+        Ok(Self { _session: session, load, ping, done, pong, _subscribers: subscribers })
     }
 
     /// Sends pings until one is answered.
@@ -78,7 +79,6 @@ impl Raw {
                 return Ok(());
             }
         }
-        drop(self.session.clone());
         Err(ended(()))
     }
 }
