@@ -5,7 +5,7 @@ mod outbox;
 pub(crate) use outbox::refusal;
 pub use outbox::{Action, Outbox};
 
-use aldis_envelope::{CallId, Envelope, Monotonic, Now, Prefix, Refusal, Source};
+use aldis_envelope::{CallId, EntityId, Envelope, Monotonic, Now, Prefix, Refusal, Source};
 use std::any::Any;
 use std::sync::Arc;
 
@@ -37,6 +37,13 @@ pub enum Input<'a> {
     Started,
     /// A message that it subscribed to or that is addressed to it; requests and replies of calls too.
     Message(&'a Envelope),
+    /// A retained sample of its own, from a former life of this service: it comes right after the start.
+    Recovered(&'a Envelope),
+    /// What others retain for its subscriptions has come, as far as it is to be had: true where every node that is known
+    /// has told all of it, false where one has not in time. Comes once after each start; what comes later is news.
+    HistoryComplete(bool),
+    /// How [`Outbox::send_confirmed`] with this number ended.
+    Confirmed(u64, Result<(), Unconfirmed>),
     /// A call of its own has ended: with answers (each came as a message), or with the reason why there are none.
     CallEnded(CallId, Result<(), Refusal>),
     /// The deadline that it asked for has come.
@@ -53,6 +60,14 @@ pub enum Input<'a> {
     Note(&'a Note),
     /// The node shuts down: last words.
     Shutdown,
+}
+
+/// Not every matched reliable reader has confirmed a sample in time.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("not confirmed in time by {}", .missing.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "))]
+pub struct Unconfirmed {
+    /// The nodes whose readers have not.
+    pub missing: Vec<EntityId>,
 }
 
 /// What a job returns.

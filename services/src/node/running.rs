@@ -62,6 +62,7 @@ impl Node {
         for action in actions {
             match action {
                 Action::Send(message) => self.take_message(now, place, source, message, effects),
+                Action::SendConfirmed(message, _, _) => self.take_message(now, place, source, message, effects),
                 Action::Call(message, within) => self.open_call(now, place, message, within, effects),
                 Action::Job(number, job) => effects.push(Effect::Job(source, number, job)),
                 Action::Note(note) => self.note(now, note, effects),

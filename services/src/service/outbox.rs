@@ -12,6 +12,8 @@ use std::time::Duration;
 pub enum Action {
     /// Send a message.
     Send(Message),
+    /// Send a message and say when every reader has it: with this number, at most so long.
+    SendConfirmed(Message, u64, Duration),
     /// Send a request and wait for its answers for so long.
     Call(Message, Duration),
     /// Compute something outside the loop; the number comes back with the result.
@@ -42,6 +44,12 @@ impl Outbox {
     /// Sends a message. Its source must be the service's own: others are refused and noted.
     pub fn send(&mut self, message: Message) {
         self.actions.push(Action::Send(message));
+    }
+
+    /// Sends a message, and wants to be told with [`Input::Confirmed`](super::Input::Confirmed) and this number once every
+    /// matched reliable reader has it, or that some have not `within` this time. Readers that come later do not count.
+    pub fn send_confirmed(&mut self, message: Message, number: u64, within: Duration) {
+        self.actions.push(Action::SendConfirmed(message, number, within));
     }
 
     /// Sends a request and waits for answers at most `within`. The answers come as messages, then
