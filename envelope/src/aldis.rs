@@ -1,5 +1,7 @@
 //! Requests and answers of Aldis's own services: content type `aldis`, postcard's format.
 
+pub mod dds;
+
 use crate::id::{BootId, EntityId, Source};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};

@@ -74,8 +74,25 @@ pub enum Space {
     Data,
     /// Unregisters: puts that erase nothing.
     Writer,
+    /// What writers' nodes tell readers' nodes of what they retain.
+    State,
+    /// What readers' nodes tell writers' nodes: that they are there, what they have, what they miss.
+    Ack,
     /// Liveliness tokens of services.
     Alive,
+}
+
+impl Space {
+    /// The chunk that stands before the source, where the space has one.
+    fn chunk(self) -> Option<&'static str> {
+        match self {
+            Self::Data => None,
+            Self::Writer => Some("@writer"),
+            Self::State => Some("@state"),
+            Self::Ack => Some("@ack"),
+            Self::Alive => Some("@alive"),
+        }
+    }
 }
 
 /// Why a key is none of ours, or cannot be read.
@@ -119,13 +136,15 @@ impl Keys {
         Self { root: format!("aldis/{fleet}") }
     }
 
-    /// Where envelopes with this label and instance are put: `Space::Data`, or `Space::Writer` for an unregister.
+    /// Where envelopes with this label and instance are put: `Space::Writer` for an unregister, `Space::State` and
+    /// `Space::Ack` for what nodes tell one another, else `Space::Data`.
     pub fn envelope(&self, space: Space, label: &Label, instance: Option<&Instance>) -> String {
         use fmt::Write;
         let mut key = String::with_capacity(self.root.len() + 96);
         key.push_str(&self.root);
-        if space == Space::Writer {
-            key.push_str("/@writer");
+        if let Some(chunk) = space.chunk() {
+            key.push('/');
+            key.push_str(chunk);
         }
         let source = label.source();
         // Writing to a String cannot fail.
@@ -142,7 +161,11 @@ impl Keys {
     /// The one key expression that a subscription declares: it may match too much, never too little.
     pub fn subscription(&self, space: Space, prefix: &Prefix) -> String {
         let mut key = self.root.clone();
-        key.push_str(if space == Space::Writer { "/@writer/*/*/*/" } else { "/*/*/*/" });
+        if let Some(chunk) = space.chunk() {
+            key.push('/');
+            key.push_str(chunk);
+        }
+        key.push_str("/*/*/*/");
         match prefix {
             Prefix::Text(text) => escape_prefix(text, &mut key),
             Prefix::Id(id) => {
@@ -206,6 +229,8 @@ impl Keys {
         let rest = key.strip_prefix(&self.root).and_then(|r| r.strip_prefix('/')).ok_or_else(foreign)?;
         let (space, rest) = match rest.split_once('/') {
             Some(("@writer", rest)) => (Space::Writer, rest),
+            Some(("@state", rest)) => (Space::State, rest),
+            Some(("@ack", rest)) => (Space::Ack, rest),
             Some(("@alive", rest)) => (Space::Alive, rest),
             Some(_) if !rest.starts_with('@') => (Space::Data, rest),
             _ => return Err(foreign()),

@@ -17,6 +17,7 @@ mod read;
 mod schema;
 mod service;
 mod text;
+mod topic;
 
 pub(crate) use acl::acl;
 pub(crate) use allow::Allow;
@@ -28,6 +29,7 @@ pub(crate) use locator::Locator;
 pub(crate) use schema::schema;
 pub(crate) use service::Service;
 pub(crate) use text::PlainName;
+pub(crate) use topic::Topic;
 
 use aldis_envelope::{Fleet, GuidForm, Prefix};
 use error::Fault;
@@ -67,6 +69,9 @@ pub(crate) struct Config {
     /// Who may call what, beyond the defaults.
     #[serde(default)]
     pub(crate) allow: Vec<Allow>,
+    /// What topics promise to their readers, where it is not what the patterns of UMAA say.
+    #[serde(default, rename = "topic")]
+    pub(crate) topics: Vec<Topic>,
     /// What the program writes about itself.
     #[serde(default)]
     pub(crate) log: Log,

@@ -42,6 +42,11 @@ impl Alive {
         self.services.range(Source::new(entity, first)..).copied().take_while(move |s| s.entity == entity)
     }
 
+    /// The nodes that are alive, by their entities.
+    pub fn nodes(&self) -> impl Iterator<Item = EntityId> + '_ {
+        self.services.iter().filter(|s| s.service == ServiceId::NODE).map(|s| s.entity)
+    }
+
     /// Whether nobody is at an address, as far as tokens can tell: they know ids, not mailboxes.
     pub fn is_nobody_at(&self, address: &Address) -> bool {
         self.known

@@ -52,6 +52,14 @@ counters! {
     calls_failed,
     /// Answers that came when nobody waited for them any more.
     replies_late,
+    /// Times that missing samples of retained topics were asked for.
+    asked,
+    /// Retained samples told to late joiners and to those that missed them.
+    retold,
+    /// Retained samples dropped because a topic's limit was reached.
+    shed_retained,
+    /// Words of other nodes that could not be read, or came from a source that is not theirs.
+    refused_among_nodes,
     /// Crashes of services.
     crashes,
     /// Messages of services that claimed another source than their own.

@@ -123,6 +123,12 @@ impl Hosted {
         own.into_iter().chain(self.prefixes.iter().cloned())
     }
 
+    /// What it subscribed to.
+    pub(crate) fn subscribed(&self) -> impl Iterator<Item = &Prefix> {
+        let running = self.is_running();
+        self.prefixes.iter().filter(move |_| running)
+    }
+
     /// Whether a message to this address is for it.
     pub(crate) fn receives(&self, address: &Address) -> bool {
         let source = self.spec.source;

@@ -2,6 +2,7 @@
 //!
 //! Labels are shared by the messages of a stream, so that a pointer finds the entry: the hottest look-up of the node.
 
+use crate::dds::Qos;
 use crate::event::{BridgeId, PublisherId};
 use aldis_envelope::{EntityId, KeyHash, Label};
 use std::collections::BTreeMap;
@@ -23,12 +24,16 @@ pub(crate) struct Entry {
     pub(crate) publish: bool,
     /// Whether it is taken when it comes from the bus.
     pub(crate) import: bool,
+    /// What its topic promises; none is best effort.
+    pub(crate) qos: Option<Qos>,
+    /// Whether it is of what nodes tell one another.
+    pub(crate) among_nodes: bool,
     /// Its place among the outgoing streams, once it was sent.
     pub(crate) outgoing: Option<usize>,
     /// Its place among the incoming streams of a node, once it was heard.
     pub(crate) incoming: Option<(EntityId, Option<usize>)>,
-    /// Publishers by instance.
-    pub(crate) publishers: BTreeMap<Option<KeyHash>, PublisherId>,
+    /// Publishers by instance; none where an instance was written once.
+    pub(crate) publishers: BTreeMap<Option<KeyHash>, Option<PublisherId>>,
 }
 
 /// All labels met.

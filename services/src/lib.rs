@@ -7,6 +7,7 @@ pub mod allow;
 pub mod bridge;
 pub mod calls;
 pub mod counters;
+pub mod dds;
 pub mod event;
 pub mod health;
 mod host;

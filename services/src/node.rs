@@ -4,11 +4,13 @@ mod administration;
 mod bridges;
 mod deliver;
 mod running;
+mod sharing;
 
 use crate::allow::{Allow, AllowRule};
 use crate::bridge::{Bridge, BridgeSpec};
 use crate::calls::{Alive, Calls};
 use crate::counters::Counters;
+use crate::dds::{TopicRule, Topics};
 use crate::event::{BridgeId, Effect, Event, PeerId, PublisherId};
 use crate::host::Hosted;
 use crate::labels::Labels;
@@ -20,8 +22,10 @@ use aldis_envelope::{
     Address, BootId, EntityId, Fleet, KeyHash, Keys, Label, Message, Monotonic, Now, Prefix, Priority,
     ServiceId, Space,
 };
+use sharing::Sharing;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// What a node is.
 #[derive(Debug, Clone)]
@@ -40,6 +44,10 @@ pub struct NodeConfig {
     pub import: Vec<Prefix>,
     /// Which addresses go out on the bus.
     pub export: Vec<Prefix>,
+    /// What topics promise, where it is not what the patterns of UMAA say.
+    pub topics: Vec<TopicRule>,
+    /// Whether others wait for its readers when a delivery is to be confirmed.
+    pub reliable: bool,
     /// The services, built-in ones too, in the order of their start.
     pub services: Vec<ServiceSpec>,
     /// The bridges.
@@ -52,6 +60,20 @@ enum Origin {
     Service(usize),
     Peer(BridgeId, PeerId),
     Bus,
+}
+
+/// A message that waits inside the node.
+struct Work {
+    origin: Origin,
+    message: Message,
+    /// The number and the bound where its sender wants to know that all readers have it.
+    confirm: Option<(u64, Duration)>,
+}
+
+impl Work {
+    fn new(origin: Origin, message: Message) -> Self {
+        Self { origin, message, confirm: None }
+    }
 }
 
 /// How many messages may wait inside a node while one event is handled: more is a loop between services.
@@ -72,7 +94,8 @@ pub struct Node {
     publishers: BTreeMap<(Arc<Label>, Option<KeyHash>), PublisherId>,
     counters: Counters,
     notes: Notes,
-    work: VecDeque<(Origin, Message)>,
+    work: VecDeque<Work>,
+    sharing: Sharing,
     /// Requests that wait until the tokens are told: before that, nobody knows where they can go.
     waiting_calls: Vec<(usize, Message)>,
     /// Services with wishes in their outboxes.
@@ -111,6 +134,7 @@ impl Node {
             allow: Allow::new(&config.entities, &config.operators, config.allow.clone()),
             services: config.services.iter().cloned().chain(stand_ins).map(Hosted::new).collect(),
             bridges: config.bridges.iter().map(|spec| Bridge::new(spec.clone(), &config.entities)).collect(),
+            sharing: Sharing::new(Topics::new(config.topics.clone())),
             config,
             labels: Labels::default(),
             outbound: Outbound::default(),
@@ -153,6 +177,7 @@ impl Node {
             self.event(now, event, effects);
             self.settle(now, effects);
         }
+        self.finish_sharing(now, effects);
         self.update_pause(effects);
         self.arm(effects);
     }
@@ -171,6 +196,7 @@ impl Node {
                 self.alive.set_known(true);
                 self.tokens_changed(now, effects);
                 self.send_waiting_calls();
+                self.joined(now, effects);
                 self.tell_followers(now, || Input::Bus(true), effects);
             }
             Event::BusOpened => self.bus_opened(now, effects),
@@ -201,7 +227,7 @@ impl Node {
     fn bus_opened(&mut self, now: Now, effects: &mut Vec<Effect>) {
         self.bus_is_open = true;
         self.subscriptions.clear();
-        self.subscribe(effects);
+        self.subscribe(now, effects);
         let publishers: Vec<_> = self.publishers.iter().map(|(key, &id)| (key.clone(), id)).collect();
         for ((label, instance), publisher) in publishers {
             effects.push(self.declare(&label, instance, publisher));
@@ -214,6 +240,7 @@ impl Node {
     fn bus_closed(&mut self, now: Now, why: &str, effects: &mut Vec<Effect>) {
         if std::mem::take(&mut self.bus_is_open) {
             self.inbound.went_offline();
+            self.sharing.went_offline();
             self.alive.set_known(false);
             self.tell_followers(now, || Input::Bus(false), effects);
         }
@@ -233,18 +260,22 @@ impl Node {
     }
 
     /// Has the shell subscribe to all that somebody here receives.
-    fn subscribe(&mut self, effects: &mut Vec<Effect>) {
+    fn subscribe(&mut self, now: Now, effects: &mut Vec<Effect>) {
         let mut prefixes: Vec<Prefix> =
             self.config.entities.iter().map(|&entity| Prefix::Id(Address::Entity(entity))).collect();
         prefixes.extend(self.services.iter().flat_map(Hosted::prefixes));
         prefixes.extend(self.bridges.iter().flat_map(|bridge| bridge.spec.export.iter().cloned()));
         let mut expressions = self.keys.cover(Space::Data, &prefixes);
         expressions.extend(self.keys.cover(Space::Writer, &prefixes));
+        let (to_node, to_nodes) = sharing::subscriptions(self.entity());
+        expressions.push(self.keys.subscription(Space::State, &to_node));
+        expressions.extend(to_nodes.iter().map(|prefix| self.keys.subscription(Space::Ack, prefix)));
         if self.bus_is_open && expressions != self.subscriptions {
             self.subscriptions.clone_from(&expressions);
             effects.push(Effect::Subscribe(expressions));
         }
         self.labels_are_stale = true;
+        self.readers_changed(now, effects);
     }
 
     fn declare(&self, label: &Label, instance: Option<KeyHash>, publisher: PublisherId) -> Effect {
@@ -269,7 +300,8 @@ impl Node {
     fn arm(&mut self, effects: &mut Vec<Effect>) {
         let services = self.services.iter().filter_map(Hosted::next_deadline);
         let bridges = self.bridges.iter().filter_map(Bridge::next_deadline);
-        let next = services.chain(bridges).chain(self.calls.next_deadline()).min();
+        let shared = self.sharing.next_deadline();
+        let next = services.chain(bridges).chain(self.calls.next_deadline()).chain(shared).min();
         if let Some(at) = next
             && self.armed != next
             && !self.ending

@@ -40,7 +40,7 @@ pub enum Input<'a> {
     /// A retained sample of its own, from a former life of this service: it comes right after the start.
     Recovered(&'a Envelope),
     /// What others retain for its subscriptions has come, as far as it is to be had: true where every node that is known
-    /// has told all of it, false where one has not in time. Comes once after each start; what comes later is news.
+    /// has told all of it, false where one has not in time or no other node is known. Comes once after each start; what comes later is news.
     HistoryComplete(bool),
     /// How [`Outbox::send_confirmed`] with this number ended.
     Confirmed(u64, Result<(), Unconfirmed>),

@@ -86,7 +86,7 @@ fn two_topics_to_one_service_do_not_share_an_instance() {
 fn foreign_keys_are_told_apart() {
     let keys = keys();
     for key in
-        ["aldis/red/1/2/-/a", "aldis/blue", "aldis/blue/@state/1/2/-/a", "x/blue/1/2/-/a", "aldis/blue/1/2/-"]
+        ["aldis/red/1/2/-/a", "aldis/blue", "aldis/blue/@link/1/2/-/a", "x/blue/1/2/-/a", "aldis/blue/1/2/-"]
     {
         assert!(matches!(keys.parse(key), Err(KeyError::Foreign(_))), "{key}");
     }

@@ -15,6 +15,12 @@ const EVENTS_MAX: usize = 65_536;
 /// How many are taken at once: less than what makes a bridge's queue overflow before the node can pause.
 const TAKEN_MAX: usize = 512;
 
+/// How many keys are declared at once: each takes as long as many events.
+const LEARNED_MAX: usize = 8;
+
+/// How many keys may wait to be declared: what is beyond travels as text.
+const LEARNING_MAX: usize = 4_096;
+
 /// How long Zenoh's thread waits for a place before it sheds. Its peer's senders wait as long, so it stays well below
 /// the five seconds after which Zenoh gives up a transport.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -61,7 +67,7 @@ impl Inbox {
             Ok(envelope) => Event::Sample(envelope),
             Err(why) => Event::SampleRefused(why),
         };
-        if state.decoder.take_learned() {
+        if state.decoder.take_learned() && state.learned.len() < LEARNING_MAX {
             state.learned.push(key.to_owned());
         } else if state.events.is_empty() {
             // What waits goes first, and Zenoh hands over the samples of one stream one after the other: so an event that
@@ -114,7 +120,9 @@ impl Inbox {
         if state.shed > 0 {
             into.push(Event::SamplesShed(std::mem::take(&mut state.shed)));
         }
-        let (learned, some_left) = (std::mem::take(&mut state.learned), !state.events.is_empty());
+        let learned = state.learned.len().min(LEARNED_MAX);
+        let learned = state.learned.drain(..learned).collect();
+        let some_left = !state.events.is_empty() || !state.learned.is_empty();
         drop(state);
         if some_left {
             self.filled.notify_one();

@@ -2,6 +2,8 @@
 
 mod bus;
 mod child;
+mod join;
+mod service_node;
 mod statistics;
 mod uxas;
 
@@ -10,7 +12,9 @@ use clap::Subcommand;
 
 /// Measure this machine: each figure beside a peer's or the limit's, turn about in the same run.
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json")]
+#[command(
+    after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json\n  aldis bench join --instances 10000 --rate 1000 --json"
+)]
 pub(crate) struct Bench {
     #[command(subcommand)]
     what: What,
@@ -22,9 +26,14 @@ enum What {
     Bus(bus::BusBench),
     /// From a UxAS stream through a node to a UxAS stream, against a plain TCP copy.
     Uxas(uxas::UxasBench),
+    /// A late joiner of many retained instances, while their writer keeps writing.
+    Join(join::JoinBench),
     /// The other process of `bench bus`.
     #[command(hide = true)]
     BusPeer(bus::BusPeer),
+    /// The late joiner of `bench join`.
+    #[command(hide = true)]
+    Joiner(join::Joiner),
     /// The plain TCP copy of `bench uxas`.
     #[command(hide = true)]
     TcpCopy(uxas::TcpCopy),
@@ -35,8 +44,17 @@ impl Bench {
         match self.what {
             What::Bus(bench) => bench.run(),
             What::Uxas(bench) => bench.run(),
+            What::Join(bench) => bench.run(),
+            What::Joiner(joiner) => joiner.run(),
             What::BusPeer(peer) => peer.run(),
             What::TcpCopy(copy) => copy.run(),
         }
+    }
+}
+
+/// The far side of a measurement serves until the measuring process kills it.
+fn serve_until_killed() -> ! {
+    loop {
+        std::thread::park();
     }
 }

@@ -114,6 +114,8 @@ impl Member {
         node.services =
             vec![desk_service(Source::new(config.entities.own(), free_service()), prefixes, desk)];
         node.bridges.clear();
+        // A command comes and goes: nobody is to wait for it.
+        node.reliable = false;
         Self::start(node, outside)
     }
 

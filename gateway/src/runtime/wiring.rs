@@ -49,6 +49,8 @@ pub(crate) fn node_config(config: &Config) -> NodeConfig {
         allow: config.allow.iter().map(config::Allow::rule).collect(),
         import: config.routing.import.clone(),
         export: config.routing.export.clone(),
+        topics: config.topics.iter().map(config::Topic::rule).collect(),
+        reliable: true,
         services,
         bridges: config.bridges.iter().map(|bridge| bridge_spec(own, bridge)).collect(),
     }

@@ -1,6 +1,6 @@
 //! What service 1 says of its node.
 
-use super::{Node, Origin};
+use super::{Node, Origin, Work};
 use aldis_envelope::aldis::{NodeStatus, ServiceStatus};
 use aldis_envelope::{Address, Call, ContentType, Envelope, Label, Message, Name, Now, Role};
 use bytes::Bytes;
@@ -59,6 +59,7 @@ impl Node {
         };
         let label = Arc::new(Label::limitedcast(to, content_type, name.into(), from));
         let call = Some(Box::new(Call { id: call.id, role: Role::Reply { last: true } }));
-        self.work.push_back((Origin::Service(service), Message { call, ..Message::new(label, content) }));
+        let reply = Message { call, ..Message::new(label, content) };
+        self.work.push_back(Work::new(Origin::Service(service), reply));
     }
 }

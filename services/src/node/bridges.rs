@@ -1,6 +1,6 @@
 //! Bridges and their peers, as events of the node.
 
-use super::{Node, Origin};
+use super::{Node, Origin, Work};
 use crate::event::{BridgeEvent, BridgeId, Effect, PeerEvent, PeerId};
 use crate::map::uxas::Refused;
 use crate::service::{Component, ComponentHealth, Condition, Level};
@@ -60,7 +60,9 @@ impl Node {
 
     fn import(&mut self, now: Now, id: BridgeId, peer: PeerId, message: Bytes, effects: &mut Vec<Effect>) {
         match self.bridges[id.0].import(message) {
-            Ok(imported) => self.route(now, Origin::Peer(id, peer), imported.message, effects),
+            Ok(imported) => {
+                self.route(now, Work::new(Origin::Peer(id, peer), imported.message), effects);
+            }
             Err(Refused::Filtered) => {}
             Err(why) => {
                 let from = self.bridges[id.0].peer_name(peer).to_owned();

@@ -1,21 +1,26 @@
 //! Where messages go: to services here, to peers of bridges, out on the bus.
 
-use super::{Node, Origin};
+use super::{Node, Origin, Work, sharing};
+use crate::dds::Step;
 use crate::event::{BridgeId, Effect, PeerId, PublisherId};
 use crate::labels::Entry;
 use crate::service::{Input, Level, refusal};
 use aldis_envelope::{
-    Address, Call, Change, Envelope, KeyHash, Label, Message, Now, Priority, Refusal, Role, ServiceId, Space,
-    Stamp, aldis,
+    Address, Call, Change, Envelope, KeyHash, Label, Now, Priority, Refusal, Role, ServiceId, Space, Stamp,
+    aldis,
 };
 use std::sync::Arc;
 
 /// How many publishers are declared at the most: Zenoh keeps a route for each. Rarer keys are put on undeclared.
 pub(super) const PUBLISHERS_MAX: usize = 2_000;
+/// How many instances of one stream get a publisher. Zenoh looks a key that is not declared up among all that are, so that
+/// a topic of thousands of instances is faster with few.
+const INSTANCE_PUBLISHERS_MAX: usize = 64;
 
 impl Node {
     /// A message that starts here: it is stamped, and goes everywhere.
-    pub(super) fn route(&mut self, now: Now, origin: Origin, message: Message, effects: &mut Vec<Effect>) {
+    pub(super) fn route(&mut self, now: Now, work: Work, effects: &mut Vec<Effect>) {
+        let Work { origin, message, confirm } = work;
         let place = self.label(&message.label);
         let (outgoing, publish) = self.outgoing(place);
         let (sequence, skipped) = self.outbound.next(outgoing);
@@ -30,14 +35,24 @@ impl Node {
             via: Vec::new(),
         };
         let envelope = Envelope { message, stamp };
+        let qos = self.labels.entry(place).qos;
+        if let Some(qos) = qos {
+            self.counters.shed_retained += self.sharing.writers.wrote(now.monotonic, qos, publish, &envelope);
+        }
         self.deliver_here(now, origin, place, &envelope, effects);
+        if let Some((number, within)) = confirm {
+            let source = envelope.message.label.source();
+            let deadline = now.monotonic + within;
+            let at_once = self.sharing.writers.confirm(source, number, &envelope, deadline);
+            self.tell_confirmed(now, at_once.into_iter().collect(), effects);
+        }
         let elsewhere = publish && !self.is_for_a_service_here(&envelope.message.label.address);
         if !elsewhere {
             return;
         }
         if self.bus_is_open {
             self.publish(place, envelope, effects);
-        } else {
+        } else if qos.is_none() {
             self.outbound.held_back(outgoing, skipped);
             self.counters.held_back_offline += 1;
         }
@@ -51,7 +66,21 @@ impl Node {
             return;
         }
         let place = self.label(&envelope.message.label);
-        if !self.labels.entry(place).import || !self.accept(now, place, envelope, effects) {
+        let entry = self.labels.entry(place);
+        if entry.among_nodes {
+            self.told_by_node(now, envelope, effects);
+            return;
+        }
+        if !entry.import {
+            return;
+        }
+        if let Some(qos) = entry.qos.filter(|_| !entry.services.is_empty()) {
+            let mut step = Step::default();
+            self.sharing.reading.sample(now.monotonic, qos, envelope, &mut step);
+            self.take_step(now, step, effects);
+            return;
+        }
+        if !self.accept(now, place, envelope, effects) {
             return;
         }
         self.deliver_here(now, Origin::Bus, place, envelope, effects);
@@ -87,7 +116,7 @@ impl Node {
     }
 
     /// Hands an envelope to the services and the bridges here that receive it.
-    fn deliver_here(
+    pub(super) fn deliver_here(
         &mut self,
         now: Now,
         origin: Origin,
@@ -131,7 +160,7 @@ impl Node {
             let text = format!("a call of {} to {own} is refused: {why}", label.source());
             self.say(now, Level::Warning, "forbidden", text, effects);
             let refused = refusal(own, request, Refusal::NotAllowed(why));
-            self.work.extend(refused.map(|message| (Origin::Service(service), message)));
+            self.work.extend(refused.map(|message| Work::new(Origin::Service(service), message)));
         } else if label.descriptor() == aldis::PING {
             let content = request.message.content.clone();
             self.reply_as_host(service, request, aldis::PONG, content);
@@ -233,7 +262,8 @@ impl Node {
         }
     }
 
-    /// The publisher of a label and instance, declared at its first use; none when there are too many.
+    /// The publisher of a label and instance; none when there are too many. That of an instance is declared at its second
+    /// use: thousands at once, as at a start, would hold the node up.
     fn publisher(
         &mut self,
         place: usize,
@@ -241,8 +271,16 @@ impl Node {
         instance: Option<KeyHash>,
         effects: &mut Vec<Effect>,
     ) -> Option<PublisherId> {
-        if let Some(&known) = self.labels.entry(place).publishers.get(&instance) {
-            return Some(known);
+        let own = &mut self.labels.entry(place).publishers;
+        match own.get(&instance) {
+            Some(Some(known)) => return Some(*known),
+            None if instance.is_some() => {
+                if own.len() < INSTANCE_PUBLISHERS_MAX {
+                    own.insert(instance, None);
+                }
+                return None;
+            }
+            _ => {}
         }
         let next = PublisherId(self.publishers.len());
         let known = self.publishers.get(&(label.clone(), instance)).copied();
@@ -255,7 +293,7 @@ impl Node {
                 next
             }
         };
-        self.labels.entry(place).publishers.insert(instance, publisher);
+        self.labels.entry(place).publishers.insert(instance, Some(publisher));
         Some(publisher)
     }
 
@@ -278,7 +316,7 @@ impl Node {
         self.services.iter().any(|hosted| hosted.spec.source == *to && hosted.is_running())
     }
 
-    fn label(&mut self, label: &Arc<Label>) -> usize {
+    pub(super) fn label(&mut self, label: &Arc<Label>) -> usize {
         if std::mem::take(&mut self.labels_are_stale) {
             self.labels.forget();
         }
@@ -297,6 +335,8 @@ impl Node {
             bridges,
             publish: matches(&self.config.export),
             import: matches(&self.config.import),
+            qos: self.sharing.topics.of(address).filter(|_| label.is_broadcast()),
+            among_nodes: sharing::is_among_nodes(label),
             outgoing: None,
             incoming: None,
             publishers: Default::default(),

@@ -1,11 +1,16 @@
 //! The life of services inside a node: starts, crashes, deadlines, notes, the end.
 
-use super::{Node, Origin, WORK_MAX};
+use super::{Node, Origin, WORK_MAX, Work};
 use crate::event::Effect;
 use crate::host::Ran;
 use crate::service::{Action, Component, ComponentHealth, Condition, Input, JobOutput, Level, Note};
 use aldis_envelope::{Address, CallId, Message, Now, Refusal, ServiceId, Source};
 use std::time::Duration;
+
+/// What a service says.
+fn work(place: usize, message: Message) -> Work {
+    Work::new(Origin::Service(place), message)
+}
 
 impl Node {
     pub(super) fn start_service(&mut self, now: Now, place: usize, effects: &mut Vec<Effect>) {
@@ -21,7 +26,8 @@ impl Node {
         } else {
             self.after(now, place, ran, effects);
         }
-        self.subscribe(effects);
+        self.subscribe(now, effects);
+        self.catch_up(now, place, effects);
     }
 
     /// Gives a service an input and looks after what comes of it.
@@ -51,8 +57,8 @@ impl Node {
             while let Some(place) = self.awake.pop_front() {
                 self.take_actions(now, place, effects);
             }
-            let Some((origin, message)) = self.work.pop_front() else { return };
-            self.route(now, origin, message, effects);
+            let Some(work) = self.work.pop_front() else { return };
+            self.route(now, work, effects);
         }
     }
 
@@ -61,8 +67,12 @@ impl Node {
         let actions: Vec<_> = self.services[place].actions().collect();
         for action in actions {
             match action {
-                Action::Send(message) => self.take_message(now, place, source, message, effects),
-                Action::SendConfirmed(message, _, _) => self.take_message(now, place, source, message, effects),
+                Action::Send(message) => self.take_message(now, source, work(place, message), effects),
+                Action::SendConfirmed(message, number, within) => {
+                    let confirm = Some((number, within));
+                    let work = Work { confirm, ..work(place, message) };
+                    self.take_message(now, source, work, effects);
+                }
                 Action::Call(message, within) => self.open_call(now, place, message, within, effects),
                 Action::Job(number, job) => effects.push(Effect::Job(source, number, job)),
                 Action::Note(note) => self.note(now, note, effects),
@@ -72,21 +82,14 @@ impl Node {
                         effects.push(Effect::Token(source, false));
                     }
                     self.service_health(now, source, Condition::Degraded, "retired");
-                    self.subscribe(effects);
+                    self.subscribe(now, effects);
                 }
             }
         }
     }
 
-    fn take_message(
-        &mut self,
-        now: Now,
-        place: usize,
-        source: Source,
-        message: Message,
-        effects: &mut Vec<Effect>,
-    ) {
-        let claimed = message.label.source();
+    fn take_message(&mut self, now: Now, source: Source, work: Work, effects: &mut Vec<Effect>) {
+        let claimed = work.message.label.source();
         if claimed != source {
             self.counters.refused_sources += 1;
             let text = format!("service {source} tried to send as {claimed}: refused");
@@ -97,9 +100,9 @@ impl Node {
                 format!("more than {WORK_MAX} messages wait inside the node: those of {source} are dropped");
             self.say(now, Level::Error, "shed inside", text, effects);
         } else if self.work.is_empty() {
-            self.route(now, Origin::Service(place), message, effects);
+            self.route(now, work, effects);
         } else {
-            self.work.push_back((Origin::Service(place), message));
+            self.work.push_back(work);
         }
     }
 
@@ -118,7 +121,7 @@ impl Node {
         let alive = if here { &nobody } else { &self.alive };
         match self.calls.open(source.service, id, &to, now.monotonic + within, alive) {
             Ok(()) if !here && !self.alive.is_known() => self.waiting_calls.push((place, message)),
-            Ok(()) => self.take_message(now, place, source, message, effects),
+            Ok(()) => self.take_message(now, source, work(place, message), effects),
             Err(reason) => self.call_ended(now, (source.service, id, Err(reason)), effects),
         }
     }
@@ -128,7 +131,7 @@ impl Node {
         for (place, message) in std::mem::take(&mut self.waiting_calls) {
             let id = message.call.as_ref().map(|call| call.id);
             if id.is_some_and(|id| self.calls.is_open(message.label.source().service, id)) {
-                self.work.push_back((Origin::Service(place), message));
+                self.work.push_back(work(place, message));
             }
         }
     }
@@ -184,6 +187,7 @@ impl Node {
                 self.run(now, place, Input::Deadline, effects);
             }
         }
+        self.sharing_due(now, effects);
         self.give_up_stalled_peers(now, effects);
     }
 
@@ -232,6 +236,7 @@ impl Node {
             self.run(now, place, Input::Shutdown, effects);
             self.settle(now, effects);
         }
+        self.leave(now, effects);
         if self.bus_is_open {
             let running: Vec<_> = self.sources_running().collect();
             effects.extend(running.into_iter().map(|source| Effect::Token(source, false)));

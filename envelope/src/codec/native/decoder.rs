@@ -12,19 +12,23 @@ use crate::name::{ContentType, Descriptor, Group, Name};
 use crate::stamp::{Priority, Stamp, VIA_MAX};
 use crate::time::Wall;
 use bytes::Bytes;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// How many keys and labels a decoder remembers. A fleet of 100 vehicles with 40 streams each stays below; beyond it
 /// the memory is forgotten whole, which costs time but nothing else.
 const REMEMBERED_MAX: usize = 8_192;
 
+/// How many keys of one label count as learned: those of a topic with more instances than this are better left alone.
+const LEARNED_OF_LABEL_MAX: u32 = 64;
+
 /// Reads envelopes. It remembers keys and labels, so that the messages of one stream share their label.
 #[derive(Debug)]
 pub struct Decoder {
     keys: Keys,
     known: BTreeMap<Arc<str>, Arc<Known>>,
-    labels: BTreeSet<Arc<Label>>,
+    /// With the number of keys known of each.
+    labels: BTreeMap<Arc<Label>, u32>,
     last: Option<(Arc<str>, Arc<Known>)>,
     learned: bool,
 }
@@ -44,7 +48,7 @@ struct Known {
 impl Decoder {
     /// A decoder of one fleet's keys.
     pub fn new(keys: Keys) -> Self {
-        Self { keys, known: BTreeMap::new(), labels: BTreeSet::new(), last: None, learned: false }
+        Self { keys, known: BTreeMap::new(), labels: BTreeMap::new(), last: None, learned: false }
     }
 
     /// Reads an envelope from a sample; `deleted` says that the sample is a Zenoh DELETE.
@@ -71,7 +75,7 @@ impl Decoder {
         }
     }
 
-    /// Whether a key was met for the first time since this was last asked.
+    /// Whether a key was met for the first time since this was last asked, and is one of few of its label.
     pub fn take_learned(&mut self) -> bool {
         std::mem::take(&mut self.learned)
     }
@@ -103,15 +107,15 @@ impl Decoder {
             self.known.clear();
             self.labels.clear();
         }
-        known.label = match self.labels.get(&known.label) {
-            Some(label) => label.clone(),
-            None => {
-                self.labels.insert(known.label.clone());
-                known.label
-            }
-        };
+        if let Some((label, _)) = self.labels.get_key_value(&known.label) {
+            known.label = label.clone();
+        }
         let (key, known): (Arc<str>, _) = (key.into(), Arc::new(known));
-        self.learned |= self.known.insert(key.clone(), known.clone()).is_none();
+        if self.known.insert(key.clone(), known.clone()).is_none() {
+            let of_label = self.labels.entry(known.label.clone()).or_default();
+            *of_label += 1;
+            self.learned |= *of_label <= LEARNED_OF_LABEL_MAX;
+        }
         Ok((key, known))
     }
 }
@@ -193,6 +197,10 @@ fn read_change(known: &Known, rest: &mut Reader<'_>, deleted: bool) -> Result<Ch
     };
     let agrees = deleted == (change == Change::Dispose)
         && (known.space == Space::Writer) == (change == Change::Unregister);
+    let among_nodes = matches!(known.space, Space::State | Space::Ack);
+    if among_nodes && (change != Change::Put || known.label.attributes.content_type != ContentType::Aldis) {
+        return Err(HeaderError::Disagrees(format!("{:?} in {:?}", known.label.descriptor(), known.space)));
+    }
     if !agrees {
         let how = if deleted { "a delete" } else { "a put" };
         return Err(HeaderError::Disagrees(format!("{change:?} came as {how} in {:?}", known.space)));

@@ -7,7 +7,6 @@ use super::super::exit::Failure;
 use super::super::print_line;
 use super::child::{Process, free_port};
 use super::statistics::{median, paired, percentile, rounded};
-use crate::config::Config;
 use serde_json::json;
 use std::time::Duration;
 
@@ -60,12 +59,6 @@ struct Figures {
     lost: u64,
 }
 
-/// A node's `[bus]` table as text: peers that know each other by address alone.
-fn configuration(entity: u64, bus: &str) -> Result<Config, Failure> {
-    let text = format!("name = \"bench-{entity}\"\nfleet = \"bench\"\nentities = [{entity}]\n[bus]\n{bus}\n");
-    Config::parse("bench", &text).map_err(Failure::from)
-}
-
 impl BusBench {
     pub(super) fn run(self) -> Result<(), Failure> {
         let (raw_port, node_port) = (free_port()?, free_port()?);
@@ -100,13 +93,6 @@ impl BusBench {
         node.leave()?;
         print_line(if self.json { result.to_string() } else { format!("{result:#}") });
         if lost > 0 { Err(Failure::Failed(format!("{lost} messages were lost"))) } else { Ok(()) }
-    }
-
-    /// The far side serves until the measuring process kills it.
-    fn serve_until_killed() -> ! {
-        loop {
-            std::thread::park();
-        }
     }
 
     fn loads(&self, mut sides: [&mut dyn Side; 2], size: usize) -> Result<[Figures; 2], Failure> {

@@ -1,13 +1,11 @@
 //! The node: from the outbox of a service in one process to the handler of a service in another.
 
-use super::{BusBench, LAST, PATIENCE, Side, configuration, content, ended};
+use super::super::service_node::{label, member, source};
+use super::{LAST, PATIENCE, Side, content, ended};
 use crate::cli::exit::Failure;
 use crate::cli::member::Member;
-use crate::runtime;
-use aldis_envelope::{
-    ContentType, EntityId, Label, Message, Monotonic, Name, Now, Prefix, ServiceId, Source,
-};
-use aldis_services::{Input, Outbox, Service, ServiceSpec};
+use aldis_envelope::{Label, Message, Monotonic, Now, Prefix};
+use aldis_services::{Input, Outbox, Service};
 use bytes::Bytes;
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::time::{Duration, Instant};
@@ -16,33 +14,6 @@ use std::time::{Duration, Instant};
 const BATCH: u64 = 256;
 /// How often the sending service looks for something to do.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
-
-fn source(entity: u64) -> Result<Source, Failure> {
-    let ids = EntityId::new(entity).and_then(|e| ServiceId::new(100).map(|s| Source::new(e, s)));
-    ids.map_err(|why| Failure::Failed(why.to_string()))
-}
-
-fn label(name: &str, from: Source) -> Result<Arc<Label>, Failure> {
-    let name = Name::new(name).map_err(|why| Failure::Failed(why.to_string()))?;
-    Ok(Arc::new(Label::broadcast(ContentType::Cdr, name, from)))
-}
-
-/// A node whose service is made once: it is not expected to crash.
-fn member(
-    entity: u64,
-    bus: &str,
-    make: impl Fn() -> Box<dyn Service> + Send + Sync + 'static,
-) -> Result<Member, Failure> {
-    let config = configuration(entity, bus)?;
-    let outside = runtime::outside(&config).map_err(|why| Failure::Failed(why.to_string()))?;
-    let mut node = runtime::node_config(&config);
-    node.services.push(ServiceSpec {
-        source: source(entity)?,
-        name: "bench".into(),
-        factory: Arc::new(make),
-    });
-    Member::start(node, outside)
-}
 
 /// What the sending service is to do.
 enum Task {
@@ -237,5 +208,5 @@ pub(super) fn serve(connect: &str) -> Result<(), Failure> {
     let make =
         move || -> Box<dyn Service> { Box::new(Sink { done: done.clone(), pong: pong.clone(), seen: 0 }) };
     let _member = member(2, &format!("connect = [\"{connect}\"]"), make)?;
-    BusBench::serve_until_killed()
+    crate::cli::bench::serve_until_killed()
 }

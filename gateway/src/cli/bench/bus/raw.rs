@@ -1,6 +1,7 @@
 //! Raw Zenoh: what the node is measured against.
 
-use super::{BusBench, LAST, PATIENCE, Side, configuration, content, ended};
+use super::super::service_node::configuration;
+use super::{LAST, PATIENCE, Side, content, ended};
 use crate::cli::exit::Failure;
 use crate::config::bus::zenoh_config;
 use bytes::Bytes;
@@ -132,5 +133,5 @@ pub(super) fn serve(connect: &str) -> Result<(), Failure> {
         .wait()
         .map_err(failed)?;
     let _ping = session.declare_subscriber(PING).callback(on_ping).wait().map_err(failed)?;
-    BusBench::serve_until_killed()
+    crate::cli::bench::serve_until_killed()
 }

@@ -1,0 +1,112 @@
+//! Quality of service by topic: the pattern of data that a name belongs to, or what the configuration says.
+
+use aldis_envelope::{Address, Prefix};
+
+/// How many samples of one stream are retained where nothing else is said: at 300 bytes each 60 MB.
+const SAMPLES_MAX: usize = 200_000;
+
+/// For how long a sample is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Durability {
+    /// Until every reader that is there has it.
+    Volatile,
+    /// For late joiners, as long as the writer's node lives.
+    TransientLocal,
+}
+
+/// How many samples of an instance are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Keep {
+    /// The newest so many.
+    Last(u32),
+    /// All, within the limit.
+    All,
+}
+
+/// What a topic promises to its reliable readers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Qos {
+    /// For how long.
+    pub durability: Durability,
+    /// How many an instance.
+    pub keep: Keep,
+    /// How many samples of one stream are kept at the most; beyond it the oldest go, and readers are told.
+    pub samples_max: usize,
+}
+
+/// What a configuration says of topics.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TopicRule {
+    /// Of which.
+    pub prefix: Prefix,
+    /// None: best effort, nothing is kept.
+    pub qos: Option<Qos>,
+}
+
+/// The quality of service of every topic.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Topics {
+    rules: Vec<TopicRule>,
+}
+
+impl Topics {
+    /// Topics under some rules, the first that matches counts; then the patterns of UMAA.
+    pub fn new(rules: Vec<TopicRule>) -> Self {
+        Self { rules }
+    }
+
+    /// What an address promises; none is best effort. Ids and mailboxes are no topics.
+    pub fn of(&self, address: &Address) -> Option<Qos> {
+        let Address::Name(name) = address else { return None };
+        match self.rules.iter().find(|rule| rule.prefix.matches(address)) {
+            Some(rule) => rule.qos,
+            None => by_pattern(name.as_str()),
+        }
+    }
+}
+
+/// The data patterns of UMAA (umaa-so, Quality of service). Version 6.0 names topics by their types.
+fn by_pattern(name: &str) -> Option<Qos> {
+    let name = name.strip_prefix("UMAA::")?;
+    let name = name.strip_suffix("Type").unwrap_or(name);
+    let kept = |keep| Some(Qos { durability: Durability::TransientLocal, keep, samples_max: SAMPLES_MAX });
+    if name.ends_with("LogReport") {
+        return Some(Qos { durability: Durability::Volatile, keep: Keep::All, samples_max: SAMPLES_MAX });
+    }
+    if name.ends_with("CommandStatus") {
+        // No transition may be skipped.
+        return kept(Keep::All);
+    }
+    kept(Keep::Last(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(name: &str) -> Option<(Durability, Keep)> {
+        Topics::default().of(&Address::new(name).unwrap()).map(|qos| (qos.durability, qos.keep))
+    }
+
+    #[test]
+    fn names_tell_their_pattern() {
+        let kept = |keep| Some((Durability::TransientLocal, keep));
+        assert_eq!(of("UMAA::SO::HealthReport::HealthReport"), kept(Keep::Last(1)));
+        assert_eq!(of("UMAA::SO::X::XCommand"), kept(Keep::Last(1)));
+        assert_eq!(of("UMAA::SO::X::XCommandStatus"), kept(Keep::All));
+        assert_eq!(of("UMAA::SO::X::XCommandStatusType"), kept(Keep::All));
+        assert_eq!(of("UMAA::SO::LogReport::LogReport"), Some((Durability::Volatile, Keep::All)));
+        assert_eq!(of("afrl.cmasi.AirVehicleState"), None);
+        assert_eq!(of("eid400sid1"), None);
+    }
+
+    #[test]
+    fn the_first_rule_that_matches_counts() {
+        let qos = Qos { durability: Durability::TransientLocal, keep: Keep::Last(3), samples_max: 9 };
+        let rule = |prefix: &str, qos| TopicRule { prefix: Prefix::new(prefix).unwrap(), qos };
+        let topics = Topics::new(vec![rule("UMAA::SO::X", None), rule("UMAA", Some(qos))]);
+        assert_eq!(topics.of(&Address::new("UMAA::SO::XCommand").unwrap()), None);
+        assert_eq!(topics.of(&Address::new("UMAA::SO::YCommand").unwrap()), Some(qos));
+        assert_eq!(topics.of(&Address::new("afrl").unwrap()), None);
+    }
+}
