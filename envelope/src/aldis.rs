@@ -2,7 +2,10 @@
 
 pub mod dds;
 
+use crate::guid::Guid;
 use crate::id::{BootId, EntityId, Source};
+use crate::time::DateTime;
+use crate::umaa::{LogLevel, LogReport};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -16,8 +19,35 @@ pub const NODE_QUERY: &str = "aldis.NodeQuery";
 pub const NODE_STATUS: &str = "aldis.NodeStatus";
 /// Asks service 2 for the latest HealthReport of every resource that it has heard of; no content.
 pub const HEALTH_QUERY: &str = "aldis.HealthQuery";
-/// Asks service 3 for the log; no content.
+/// Asks service 3 for its log; the content is a [`LogQuery`], or nothing for all of it.
 pub const LOG_QUERY: &str = "aldis.LogQuery";
+
+/// Which entries of a log are asked for.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LogQuery {
+    /// Only these levels; none is all.
+    pub levels: Vec<LogLevel>,
+    /// Only this source.
+    pub source: Option<Guid>,
+    /// Only what was made at this time or later, by the writers' clocks.
+    pub since: Option<DateTime>,
+    /// Only the last so many of them.
+    pub last: u32,
+}
+
+impl LogQuery {
+    /// Asks for everything.
+    pub fn all() -> Self {
+        Self { levels: Vec::new(), source: None, since: None, last: u32::MAX }
+    }
+
+    /// Whether an entry is asked for, if it is among the last.
+    pub fn wants(&self, entry: &LogReport) -> bool {
+        (self.levels.is_empty() || self.levels.contains(&entry.level))
+            && self.source.is_none_or(|source| source == entry.source)
+            && self.since.is_none_or(|since| entry.time_stamp >= since)
+    }
+}
 
 /// What a node says of itself.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -3,4 +3,5 @@
 pub mod delimited;
 pub mod multipart;
 pub mod native;
+pub mod recording;
 pub mod stream;

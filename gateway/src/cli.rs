@@ -7,8 +7,13 @@ mod content;
 mod demo;
 mod exit;
 mod fleet;
+mod health;
+mod log;
 mod member;
 mod messages;
+mod record;
+mod replay;
+mod retained;
 mod run;
 mod telemetry;
 mod within;
@@ -57,6 +62,14 @@ enum Command {
     Call(call::CallArgs),
     /// Show who is there.
     Fleet(fleet::FleetArgs),
+    /// Record envelopes into a file.
+    Record(record::Record),
+    /// Send a recording again.
+    Replay(replay::Replay),
+    /// Show the latest health report of every resource.
+    Health(health::HealthArgs),
+    /// Show the log that a node keeps of the fleet.
+    Log(log::LogArgs),
     /// Measure this machine, side by side with the limit.
     Bench(bench::Bench),
 }
@@ -74,6 +87,10 @@ pub(crate) fn main() -> ExitCode {
         Command::Sub(args) => args.run(),
         Command::Call(args) => args.run(),
         Command::Fleet(args) => args.run(),
+        Command::Record(args) => args.run(),
+        Command::Replay(args) => args.run(),
+        Command::Health(args) => args.run(),
+        Command::Log(args) => args.run(),
         Command::Bench(args) => args.run(),
     };
     match done {

@@ -36,7 +36,8 @@ impl Clock {
     }
 }
 
-fn wall() -> Wall {
+/// The wall clock.
+pub(crate) fn wall() -> Wall {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     Wall(i64::try_from(since.as_nanos()).unwrap_or(i64::MAX))
 }

@@ -1,6 +1,7 @@
 //! Service 3: a bounded log of the fleet. The node's own warnings go out as LogReports.
 
 use crate::service::{Input, Level, Note, Outbox, Service};
+use aldis_envelope::aldis::LogQuery;
 use aldis_envelope::umaa::{self, LogLevel, LogReport, LongDescription, Topic};
 use aldis_envelope::{
     Change, ContentType, EntityId, Envelope, Guids, Label, Name, Now, Prefix, Refusal, ServiceId, Source,
@@ -51,8 +52,18 @@ impl Log {
 
     fn answer(&self, request: &Envelope, out: &mut Outbox) {
         let Ok(name) = Name::new(LogReport::NAME) else { return };
-        for entry in &self.entries {
-            out.reply(request, ContentType::Umaa, name.clone(), umaa::encode(entry), false);
+        let query = match request.message.content.is_empty() {
+            true => Some(LogQuery::all()),
+            false => aldis::decode::<LogQuery>(&request.message.content),
+        };
+        let Some(query) = query else {
+            out.refuse(request, Refusal::NotUnderstood(format!("the content of {}", aldis::LOG_QUERY)));
+            return;
+        };
+        let wanted: Vec<_> = self.entries.iter().filter(|entry| query.wants(entry)).collect();
+        let first = wanted.len().saturating_sub(query.last as usize);
+        for entry in &wanted[first..] {
+            out.reply(request, ContentType::Umaa, name.clone(), umaa::encode(*entry), false);
         }
         out.reply(request, ContentType::Umaa, name, Default::default(), true);
     }

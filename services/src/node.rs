@@ -190,6 +190,7 @@ impl Node {
             Event::Alive(source, alive) => {
                 self.alive.set(source, alive);
                 self.tokens_changed(now, effects);
+                self.token(now, source, alive, effects);
                 self.tell_followers(now, || Input::Token(source, alive), effects);
             }
             Event::AliveKnown => {

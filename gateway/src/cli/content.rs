@@ -1,8 +1,7 @@
 //! Contents on the command line: what goes in, and what comes out for people and machines.
 
 use super::exit::Failure;
-use aldis_envelope::umaa::{self, HealthReport, LogReport, Topic};
-use aldis_envelope::{ContentType, Descriptor, Label, aldis};
+use aldis_envelope::{ContentType, Descriptor, Label, aldis, umaa};
 use bytes::Bytes;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -20,32 +19,13 @@ pub(super) fn content_type(text: &str) -> Result<ContentType, String> {
 /// A content for people and machines: read where its type is known, otherwise its bytes in hexadecimal.
 pub(super) fn content_text(label: &Label, content: &[u8]) -> Value {
     let read = match (label.descriptor(), &label.attributes.content_type) {
-        (HealthReport::NAME, ContentType::Umaa) => {
-            umaa::decode::<HealthReport>(content).ok().map(|r| umaa_text(&r))
-        }
-        (LogReport::NAME, ContentType::Umaa) => umaa::decode::<LogReport>(content).ok().map(|r| log_text(&r)),
         (aldis::NODE_STATUS, ContentType::Aldis) => {
             aldis::decode::<aldis::NodeStatus>(content).map(|s| status_text(&s))
         }
+        (name, ContentType::Umaa) => umaa::topic(name).and_then(|topic| topic.json(content).ok()),
         _ => None,
     };
     read.unwrap_or_else(|| json!({ "bytes": content.len(), "hex": hex(content) }))
-}
-
-fn umaa_text(report: &HealthReport) -> Value {
-    json!({
-        "source": report.source.to_string(), "resource_id": report.resource_id.to_string(),
-        "severity": report.severity, "code": report.code, "status": report.status,
-        "log_time": aldis_envelope::Wall::from(report.log_time).to_string(),
-        "time_stamp": aldis_envelope::Wall::from(report.time_stamp).to_string(),
-    })
-}
-
-fn log_text(report: &LogReport) -> Value {
-    json!({
-        "source": report.source.to_string(), "level": report.level, "entry": report.entry,
-        "time_stamp": aldis_envelope::Wall::from(report.time_stamp).to_string(),
-    })
 }
 
 /// A node's status for people and machines.

@@ -49,7 +49,9 @@ impl Demo {
         let board = Arc::new(Mutex::new(Board::default()));
         let fleet = Fleet::start(&board)?;
         let (stop, stopped) = mpsc::unbounded_channel();
-        super::run::watch_signals(stop)?;
+        super::run::watch_signals(move || {
+            let _ = stop.send(Control::Shutdown);
+        })?;
         let ran = self.play(&fleet, &board, seconds, stopped);
         let statuses = fleet.statuses(STATUS_WITHIN)?;
         fleet.leave()?;

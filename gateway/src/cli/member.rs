@@ -4,7 +4,7 @@ use super::exit::Failure;
 use crate::clock;
 use crate::config::{Config, bus};
 use crate::runtime::{self, Control};
-use aldis_envelope::{EntityId, Monotonic, Now, Prefix, ServiceId, Source};
+use aldis_envelope::{EntityId, Fleet, Guids, Monotonic, Now, Prefix, ServiceId, Source};
 use aldis_services::{Input, NodeConfig, Outbox, Service, ServiceSpec};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -41,7 +41,19 @@ impl Join {
         ))
     }
 
-    fn load(&self) -> Result<Config, Failure> {
+    /// How the GUIDs of the fleet's services are made.
+    pub(crate) fn guids(&self) -> Result<Guids, Failure> {
+        let config = self.load()?;
+        Ok(Guids::new(&config.fleet, config.guid))
+    }
+
+    /// The fleet that it joins.
+    pub(crate) fn fleet(&self) -> Result<Fleet, Failure> {
+        Ok(self.load()?.fleet)
+    }
+
+    /// The configuration that it joins with.
+    pub(crate) fn load(&self) -> Result<Config, Failure> {
         if let Some(path) = &self.config {
             return Ok(Config::load(path)?);
         }

@@ -141,7 +141,8 @@ pub(crate) struct Subscribe {
     join: Join,
 }
 
-fn prefix(text: &str) -> Result<Prefix, String> {
+/// A prefix as an argument.
+pub(super) fn prefix(text: &str) -> Result<Prefix, String> {
     Prefix::new(text).map_err(|why| why.to_string())
 }
 

@@ -30,14 +30,16 @@ impl Run {
             config.fleet
         );
         let (control, controlled) = mpsc::unbounded_channel();
-        watch_signals(control)?;
+        watch_signals(move || {
+            let _ = control.send(Control::Shutdown);
+        })?;
         runtime::run(runtime::node_config(&config), outside, controlled)
             .map_err(|why| Failure::Failed(why.to_string()))
     }
 }
 
 /// Asks for an orderly end at the first signal.
-pub(crate) fn watch_signals(control: mpsc::UnboundedSender<Control>) -> Result<(), Failure> {
+pub(crate) fn watch_signals(end: impl FnOnce() + Send + 'static) -> Result<(), Failure> {
     let failed = |why: std::io::Error| Failure::Failed(format!("cannot watch for signals: {why}"));
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
     let watch = move || {
@@ -52,7 +54,7 @@ pub(crate) fn watch_signals(control: mpsc::UnboundedSender<Control>) -> Result<(
                 _ = interrupt.recv() => {}
                 _ = terminate.recv() => {}
             }
-            let _ = control.send(Control::Shutdown);
+            end();
         });
     };
     std::thread::Builder::new().name("signals".into()).spawn(watch).map_err(failed)?;

@@ -123,6 +123,13 @@ impl Node {
         self.announce(now, None, effects);
     }
 
+    /// A node that appears is told what is read here, before it is its turn.
+    pub(super) fn token(&mut self, now: Now, of: Source, alive: bool, effects: &mut Vec<Effect>) {
+        if alive && of.service == ServiceId::NODE && of.entity != self.entity() && self.alive.is_known() {
+            self.announce(now, Some(of.entity), effects);
+        }
+    }
+
     /// Tells all, or one node, what is read here.
     fn announce(&mut self, now: Now, to: Option<EntityId>, effects: &mut Vec<Effect>) {
         if !self.bus_is_open || (self.sharing.prefixes.is_empty() && self.sharing.number == 0) {

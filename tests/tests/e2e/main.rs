@@ -5,6 +5,7 @@
 mod access;
 mod calls;
 mod foreign;
+mod observe;
 mod relay;
 mod run;
 mod stream;
