@@ -7,7 +7,7 @@
 use crate::change::KeyHash;
 use crate::id::{EntityId, ServiceId, Source};
 use crate::key::Fleet;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
 use std::str::FromStr;
 use uuid::Uuid;
@@ -15,10 +15,39 @@ use uuid::Uuid;
 /// The namespace of name-based GUIDs: drawn once, never to change.
 const NAMESPACE: Uuid = Uuid::from_u128(0x6b1d_43f2_5a0e_4c77_9d0b_a1d1_5f1a_6e55);
 
-/// A UMAA `NumericGUID`: any RFC 4122 GUID, 16 bytes in the order of its text.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
-#[serde(transparent)]
+/// A UMAA `NumericGUID`: any RFC 4122 GUID, 16 bytes in the order of its text. In forms for people it is its text.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Guid(pub [u8; 16]);
+
+impl Guid {
+    /// The GUID of nothing, all bits zero (RFC 4122, 4.1.7): the last element of a collection that is empty.
+    pub const NIL: Self = Self([0; 16]);
+
+    /// Whether its variant is that of RFC 4122, which the ICD asks for in 3.7. Others are carried all the same.
+    pub fn is_rfc4122(self) -> bool {
+        Uuid::from_bytes(self.0).get_variant() == uuid::Variant::RFC4122
+    }
+}
+
+impl Serialize for Guid {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if serializer.is_human_readable() {
+            serializer.collect_str(self)
+        } else {
+            self.0.serialize(serializer)
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Guid {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        if deserializer.is_human_readable() {
+            String::deserialize(deserializer)?.parse().map_err(de::Error::custom)
+        } else {
+            Deserialize::deserialize(deserializer).map(Self)
+        }
+    }
+}
 
 impl fmt::Display for Guid {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -144,6 +173,18 @@ mod tests {
         assert_eq!(blue.service(red.of_service(source(400, 37))), None);
         assert_eq!(blue.service(guids(GuidForm::V5).of_service(source(400, 37))), None);
         assert_eq!(blue.service(blue.of_resource(EntityId::new(400).unwrap(), "disk")), None);
+    }
+
+    #[test]
+    fn people_read_text_and_machines_read_bytes() {
+        let guid = guids(GuidForm::Readable).of_service(source(400, 37));
+        let text = serde_json::to_string(&guid).unwrap();
+        assert_eq!(text, format!("\"{guid}\""));
+        assert_eq!(serde_json::from_str::<Guid>(&text).unwrap(), guid);
+        let why = serde_json::from_str::<Guid>("\"400\"").unwrap_err().to_string();
+        assert!(why.contains("`400` is not a GUID"), "{why}");
+        assert_eq!(postcard::to_allocvec(&guid).unwrap(), guid.0);
+        assert!(guid.is_rfc4122() && !Guid::NIL.is_rfc4122());
     }
 
     proptest! {

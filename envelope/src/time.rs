@@ -54,8 +54,16 @@ pub struct Now {
 
 /// A UMAA `DateTime`: seconds and nanoseconds since the POSIX epoch (umaa-so, Type rules).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
-#[serde(try_from = "(i64, i32)", into = "(i64, i32)")]
+#[serde(try_from = "DateTimeMembers")]
 pub struct DateTime {
+    seconds: i64,
+    nanoseconds: i32,
+}
+
+/// What a sender says, before its range is known.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DateTimeMembers {
     seconds: i64,
     nanoseconds: i32,
 }
@@ -88,16 +96,10 @@ impl DateTime {
     }
 }
 
-impl TryFrom<(i64, i32)> for DateTime {
+impl TryFrom<DateTimeMembers> for DateTime {
     type Error = DateTimeError;
-    fn try_from((seconds, nanoseconds): (i64, i32)) -> Result<Self, DateTimeError> {
-        Self::new(seconds, nanoseconds)
-    }
-}
-
-impl From<DateTime> for (i64, i32) {
-    fn from(date: DateTime) -> Self {
-        (date.seconds, date.nanoseconds)
+    fn try_from(members: DateTimeMembers) -> Result<Self, DateTimeError> {
+        Self::new(members.seconds, members.nanoseconds)
     }
 }
 
@@ -162,5 +164,15 @@ mod tests {
         assert_eq!((date.seconds(), date.nanoseconds()), (-1, 999_999_999));
         assert_eq!(Wall::from(date), Wall(-1));
         assert!(DateTime::new(0, 1_000_000_000).is_err());
+    }
+
+    #[test]
+    fn a_date_is_its_two_members_in_every_form() {
+        let date = DateTime::new(-1, 2).unwrap();
+        assert_eq!(postcard::to_allocvec(&date).unwrap(), [1, 4]);
+        assert_eq!(serde_json::to_string(&date).unwrap(), r#"{"seconds":-1,"nanoseconds":2}"#);
+        let why =
+            serde_json::from_str::<DateTime>(r#"{"seconds":0,"nanoseconds":-1}"#).unwrap_err().to_string();
+        assert!(why.contains("0 to 999999999"), "{why}");
     }
 }

@@ -1,38 +1,73 @@
-//! UMAA Support Operations types, version 5.2.1: members in the order of the wire, enums in their alphabetical order.
+//! UMAA Support Operations types: members in the order of the wire, enumerations in their alphabetical order.
 //!
-//! A content of type `umaa` is one of these in postcard's format.
+//! A content of type `umaa` is one sample of a topic in postcard's format. What all versions share is here; the topics of a
+//! version are in a module of its own, those of 5.2.1 are the default and stand here too.
 
-mod health_report;
-mod log_report;
+mod collection;
+mod command;
+mod enumeration;
+mod key;
+mod number;
+mod sequence;
+#[cfg(test)]
+mod tests;
 mod text;
+mod topics;
+pub mod v5_2_1;
 
-pub use health_report::{ErrorCode, ErrorCondition, HealthReport};
-pub use log_report::{LogLevel, LogReport};
+pub use collection::{LargeCollection, LargeListMetadata, LargeSetMetadata, ListElement, SetElement};
+pub use command::{
+    Command, CommandAckReport, CommandHeader, CommandStatus, ExecutionStatus, NoExecutionStatus,
+};
+pub use enumeration::{
+    CommandState, CommandStatusReason, EnumerationError, ErrorCode, ErrorCondition, LogLevel,
+};
+pub use key::{CommandKey, ElementKey, HealthKey, Key, SessionKey, SourceKey};
+pub use number::{DurationSeconds, LargeCollectionSize, OutOfRange, Quaternion};
+pub use sequence::{Sequence, SequenceTooLong};
 pub use text::{LongDescription, TextTooLong};
+pub use topics::{JsonError, TopicInfo, topic, topics};
+pub use v5_2_1::*;
 
-use crate::change::{Instance, KeyWidth};
+use crate::change::Instance;
+use crate::guid::Guid;
 use crate::message::{Label, Message};
 use crate::name::{ContentType, Name, NameError};
+use crate::time::DateTime;
 use crate::{Change, Source};
 use bytes::Bytes;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::fmt;
 use std::sync::Arc;
 
-/// A topic of UMAA: its name, its key and its content.
-pub trait Topic: Serialize + DeserializeOwned {
-    /// The topic's name, `UMAA::SO::<Service>::<Topic>`.
+/// A topic of UMAA by the type of its samples.
+pub trait Topic:
+    Serialize + DeserializeOwned + Clone + PartialEq + fmt::Debug + Send + Sync + 'static
+{
+    /// The topic's name: `UMAA::SO::<Service>::<Topic>`.
     const NAME: &'static str;
-    /// Whether the topic's keys fit a key hash.
-    const KEY_WIDTH: KeyWidth;
+    /// The name of its type.
+    const TYPE_NAME: &'static str;
+    /// Its key.
+    type Key: Key;
 
-    /// The serialized key: big-endian CDR of the key members.
-    fn key(&self) -> Bytes;
+    /// The key of this sample.
+    fn key(&self) -> Self::Key;
 
     /// The instance that this sample belongs to.
     fn instance(&self) -> Instance {
-        Instance::of_key(self.key(), Self::KEY_WIDTH)
+        self.key().instance()
     }
+}
+
+/// A message with the members that all have, those of large collections' elements excepted (tables 22 to 25).
+pub trait Sourced: Topic {
+    /// When the message was made (`UCSMDEInterfaceSet`, table 22).
+    fn time_stamp(&self) -> DateTime;
+
+    /// Who made it.
+    fn source(&self) -> Guid;
 }
 
 /// Why a content is not a sample of a topic.
@@ -89,6 +124,11 @@ pub fn put<T: Topic>(label: Arc<Label>, sample: &T) -> Message {
 
 /// A message that disposes a sample's instance.
 pub fn dispose<T: Topic>(label: Arc<Label>, sample: &T) -> Message {
-    let message = Message::new(label, Bytes::new()).of_instance(sample.instance());
-    Message { change: Change::Dispose, ..message }
+    about_instance(label, Change::Dispose, sample.key())
+}
+
+/// A message about an instance without a sample: a dispose or an unregister.
+pub fn about_instance(label: Arc<Label>, change: Change, key: impl Key) -> Message {
+    let message = Message::new(label, Bytes::new()).of_instance(key.instance());
+    Message { change, ..message }
 }

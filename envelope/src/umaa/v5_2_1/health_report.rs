@@ -1,44 +1,14 @@
 //! `UMAA::SO::HealthReport::HealthReport` (ICD 5.1.1, table 9).
 
-use super::{LongDescription, Topic};
-use crate::change::KeyWidth;
+use super::sourced;
 use crate::guid::Guid;
 use crate::time::DateTime;
-use bytes::Bytes;
+use crate::umaa::{ErrorCode, ErrorCondition, HealthKey, LongDescription, Topic};
 use serde::{Deserialize, Serialize};
-
-/// The kind of system that an error concerns (`ErrorCodeEnumType`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[allow(missing_docs, reason = "the field's names say it all")]
-pub enum ErrorCode {
-    Actuator,
-    Filesys,
-    None,
-    Power,
-    Processor,
-    Ram,
-    Rom,
-    Sensor,
-    Software,
-}
-
-/// How bad it is (`ErrorConditionEnumType`). The order is the wire's, not that of badness.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum ErrorCondition {
-    /// It works, with errors.
-    Error,
-    /// It does not work.
-    Fail,
-    /// Something worth knowing.
-    Info,
-    /// All is well.
-    None,
-    /// It works, but look at it.
-    Warn,
-}
 
 /// The most recent health of one resource.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
 pub struct HealthReport {
     /// The kind of system.
     pub code: ErrorCode,
@@ -53,18 +23,21 @@ pub struct HealthReport {
     /// Who reports (key).
     pub source: Guid,
     /// Whose health it is (key).
+    #[serde(rename = "resourceID")]
     pub resource_id: Guid,
 }
 
 impl Topic for HealthReport {
     const NAME: &'static str = "UMAA::SO::HealthReport::HealthReport";
-    /// Two GUIDs, 32 bytes.
-    const KEY_WIDTH: KeyWidth = KeyWidth::Wider;
+    const TYPE_NAME: &'static str = "UMAA::SO::HealthReport::HealthReportType";
+    type Key = HealthKey;
 
-    fn key(&self) -> Bytes {
-        [self.source.0, self.resource_id.0].concat().into()
+    fn key(&self) -> HealthKey {
+        HealthKey { source: self.source, resource_id: self.resource_id }
     }
 }
+
+sourced!(HealthReport);
 
 #[cfg(test)]
 mod tests {

@@ -1,25 +1,14 @@
 //! `UMAA::SO::LogReport::LogReport` (ICD 5.1.2, table 11).
 
-use super::{LongDescription, Topic};
-use crate::change::KeyWidth;
+use super::report;
 use crate::guid::Guid;
 use crate::time::DateTime;
-use bytes::Bytes;
+use crate::umaa::{LogLevel, LongDescription};
 use serde::{Deserialize, Serialize};
-
-/// The level of an entry (`LogLevelEnumType`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum LogLevel {
-    /// Something failed.
-    Error,
-    /// Worth knowing.
-    Information,
-    /// Worth a look.
-    Warning,
-}
 
 /// An entry for the fleet's log.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase", deny_unknown_fields)]
 pub struct LogReport {
     /// In words, for people.
     pub entry: LongDescription,
@@ -31,20 +20,12 @@ pub struct LogReport {
     pub source: Guid,
 }
 
-impl Topic for LogReport {
-    const NAME: &'static str = "UMAA::SO::LogReport::LogReport";
-    /// One GUID, 16 bytes.
-    const KEY_WIDTH: KeyWidth = KeyWidth::Fits16;
-
-    fn key(&self) -> Bytes {
-        Bytes::copy_from_slice(&self.source.0)
-    }
-}
+report!(LogReport, "UMAA::SO::LogReport::LogReport");
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::umaa::{decode, encode, label};
+    use crate::umaa::{Topic, decode, encode, label};
     use crate::{EntityId, ServiceId, Source};
 
     #[test]
