@@ -20,6 +20,7 @@ pub mod service;
 pub mod sim;
 pub mod streams;
 pub mod track;
+pub mod umaa;
 
 pub use bridge::BridgeSpec;
 pub use event::{BridgeEvent, BridgeId, Effect, Event, PeerEvent, PeerId, PublisherId};

@@ -1,0 +1,1 @@
+//! ResourceAllocation (ICD 5.1.3).
