@@ -21,3 +21,4 @@ pub use executor::{
     Verdict,
 };
 pub use provider::{Provider, ProviderSettings};
+pub(crate) use writer::{Writer, is_about};

@@ -5,6 +5,7 @@ use aldis_envelope::umaa::{self, Topic};
 use aldis_envelope::{Change, ContentType, Envelope, Label, Source};
 use std::marker::PhantomData;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Writes one topic in the name of a service.
 #[derive(Debug, Clone)]
@@ -22,6 +23,13 @@ impl<T: Topic> Writer<T> {
     pub(crate) fn put(&self, sample: &T, out: &mut Outbox) {
         if let Some(label) = &self.label {
             out.send(umaa::put(label.clone(), sample));
+        }
+    }
+
+    /// Puts a sample that every reader has to confirm; the answer comes with this number.
+    pub(crate) fn put_confirmed(&self, sample: &T, number: u64, within: Duration, out: &mut Outbox) {
+        if let Some(label) = &self.label {
+            out.send_confirmed(umaa::put(label.clone(), sample), number, within);
         }
     }
 

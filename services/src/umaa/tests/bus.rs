@@ -221,10 +221,10 @@ impl Bus {
             Arrival::Message(from, envelope) => {
                 if self.receives(to, &envelope) {
                     self.give(to, Input::Message(&envelope));
-                }
-                let confirmed = envelope.stamp.sequence;
-                if self.confirming.get(&confirmed).is_some_and(|waiting| waiting.writer == from) {
-                    self.arrive(to, from, Arrival::Acknowledged(to, confirmed));
+                    let sequence = envelope.stamp.sequence;
+                    if self.confirming.contains_key(&sequence) {
+                        self.arrive(to, from, Arrival::Acknowledged(to, sequence));
+                    }
                 }
             }
             Arrival::Acknowledged(reader, sequence) => {
@@ -276,7 +276,7 @@ impl Bus {
 
     fn confirm_if_all_have(&mut self, sequence: u64) {
         let done = self.confirming.get(&sequence).is_some_and(|waiting| waiting.missing.is_empty());
-        if let Some(waiting) = self.confirming.remove(&sequence).filter(|_| done) {
+        if done && let Some(waiting) = self.confirming.remove(&sequence) {
             self.give(waiting.writer, Input::Confirmed(waiting.number, Ok(())));
         }
     }

@@ -80,6 +80,20 @@ impl Checker {
             self.violations.push(format!("two holders: {holders:?}"));
         }
     }
+
+    /// Nobody is executed but the holder. Holds where no link has been silent.
+    pub(crate) fn strangers(&self) -> Vec<String> {
+        let (allocations, others): (Vec<_>, Vec<_>) =
+            self.families.iter().partition(|family| family.is_allocation());
+        let Some((_, holder)) = allocations.iter().flat_map(|family| family.executing()).next() else {
+            return Vec::new();
+        };
+        let executed = others.iter().flat_map(|family| family.executing());
+        let strange = executed.filter(|(_, consumer)| *consumer != holder);
+        strange
+            .map(|(provider, consumer)| format!("{provider} executes {consumer}, {holder} controls"))
+            .collect()
+    }
 }
 
 impl<C: Command> Family<C> {

@@ -1,16 +1,16 @@
 //! A second kind of command beside ResourceAllocation, with an execution status: a course to steer for so many turns of a
 //! clock. Its provider is as simple as an author may write one.
 
-use crate::service::{Input, Level, Outbox, Service};
+use super::asking::Seen;
+use crate::service::{Outbox, Service};
 use crate::umaa::command::{
-    Admission, Commanded, Consumer, Executor, Failure, FailureKind, Progress, Provider, ProviderSettings,
-    SessionId, Stop, Stopped, Told, Verdict,
+    Admission, Commanded, Executor, Failure, FailureKind, Progress, Provider, ProviderSettings, SessionId,
+    Stop, Stopped, Verdict,
 };
 use aldis_envelope::umaa::{CommandState, ExecutionStatus, LongDescription, SessionKey, Topic};
-use aldis_envelope::{DateTime, Guid, Guids, Monotonic, Now, Prefix, Source, umaa_command};
+use aldis_envelope::{DateTime, Guid, Guids, Monotonic, Now, Source, umaa_command};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -59,9 +59,6 @@ pub(crate) fn steer(course_degrees: f64, seconds: u32, trouble: &str) -> VectorC
         destination: Guid::NIL,
     }
 }
-
-/// What the executor was asked for, in order.
-pub(crate) type Seen<T> = Arc<Mutex<Vec<T>>>;
 
 /// Steers: one command at a time would be honest, but the tests want many.
 pub(crate) struct Steering {
@@ -180,65 +177,4 @@ pub(crate) fn provider(
 ) -> Box<dyn Service> {
     let steering = Steering::new(guids.of_service(source), asked);
     Box::new(Provider::<VectorCommand, _, _>::new(source, guids.clone(), settings, steering, admission))
-}
-
-/// What a consumer's service is asked to do from outside.
-type Wish<T> = Box<dyn FnOnce(&mut T, Now, &mut Outbox) + Send>;
-
-/// What a test shares with a service that it has started.
-pub(crate) struct Handle<T, Heard> {
-    pub(crate) wishes: Arc<Mutex<Vec<Wish<T>>>>,
-    pub(crate) heard: Seen<Heard>,
-}
-
-impl<T, Heard> Default for Handle<T, Heard> {
-    fn default() -> Self {
-        Self { wishes: Arc::default(), heard: Arc::default() }
-    }
-}
-
-impl<T, Heard> Clone for Handle<T, Heard> {
-    fn clone(&self) -> Self {
-        Self { wishes: self.wishes.clone(), heard: self.heard.clone() }
-    }
-}
-
-impl<T, Heard: Clone> Handle<T, Heard> {
-    pub(crate) fn wish(&self, wish: impl FnOnce(&mut T, Now, &mut Outbox) + Send + 'static) {
-        self.wishes.lock().unwrap().push(Box::new(wish));
-    }
-
-    pub(crate) fn heard(&self) -> Vec<Heard> {
-        self.heard.lock().unwrap().clone()
-    }
-}
-
-pub(crate) type VectorConsumer = Consumer<VectorCommand>;
-pub(crate) type VectorHandle = Handle<VectorConsumer, Told<VectorExecutionStatus>>;
-
-/// A consumer as a service that does what its test wishes.
-pub(crate) struct Client {
-    pub(crate) consumer: VectorConsumer,
-    pub(crate) handle: VectorHandle,
-}
-
-impl Service for Client {
-    fn subscriptions(&self) -> Vec<Prefix> {
-        self.consumer.subscriptions()
-    }
-
-    fn handle(&mut self, now: Now, input: Input<'_>, out: &mut Outbox) {
-        for wish in std::mem::take(&mut *self.handle.wishes.lock().unwrap()) {
-            wish(&mut self.consumer, now, out);
-        }
-        let told = self.consumer.handle(now, &input, out);
-        self.handle.heard.lock().unwrap().extend(told);
-        if matches!(input, Input::Shutdown) {
-            out.note(Level::Information, "the client ends");
-        }
-    }
-
-    fn next_deadline(&self) -> Option<Monotonic> {
-        self.consumer.next_deadline()
-    }
 }

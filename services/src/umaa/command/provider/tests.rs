@@ -1,13 +1,16 @@
 //! What a provider and a consumer do on a bus, one clause at a time.
 
 use super::*;
-use crate::umaa::command::{ConsumerSettings, Outcome, Recovery, Told};
+use crate::umaa::command::{Consumer, ConsumerSettings, Outcome, Recovery, Told};
+use crate::umaa::tests::asking::{Asking, Handle, Seen};
 use crate::umaa::tests::bus::{Bus, Factory, guids, source};
-use crate::umaa::tests::vector::{
-    Client, Seen, VectorCommand, VectorConsumer, VectorExecutionStatus, VectorHandle, provider, steer,
-};
+use crate::umaa::tests::vector::{VectorCommand, VectorExecutionStatus, provider, steer};
+
 use aldis_envelope::umaa::CommandStatusReason;
 use std::sync::Arc;
+
+type VectorConsumer = Consumer<VectorCommand>;
+type VectorHandle = Handle<VectorConsumer>;
 
 const SECOND: Duration = Duration::from_secs(1);
 
@@ -31,8 +34,8 @@ fn provider_of(settings: ProviderSettings, asked: Seen<String>) -> Factory {
 
 fn client_of(settings: ConsumerSettings, handle: VectorHandle, at: Source) -> Factory {
     Arc::new(move || {
-        let consumer = VectorConsumer::new(at, guids(), settings.clone());
-        Box::new(Client { consumer, handle: handle.clone() })
+        let part = VectorConsumer::new(at, guids(), settings.clone());
+        Box::new(Asking { part, handle: handle.clone() })
     })
 }
 
@@ -294,7 +297,7 @@ fn a_consumer_resumes_or_cancels_what_it_left() {
         sea.order(steer(90.0, 5, ""));
         sea.run(1);
         sea.bus.crash(captain());
-        sea.client.heard.lock().unwrap().clear();
+        sea.client.take();
         sea.bus.start(captain());
         sea.run(10);
         let heard =
