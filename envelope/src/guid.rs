@@ -7,6 +7,7 @@
 use crate::change::KeyHash;
 use crate::id::{EntityId, ServiceId, Source};
 use crate::key::Fleet;
+use crate::time::Wall;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
 use std::str::FromStr;
@@ -115,6 +116,11 @@ impl Guids {
         self.named(&format!("eid{entity}/{name}"))
     }
 
+    /// The GUID of a consumer's session: one for each time and number, never the same again.
+    pub fn of_session(&self, consumer: Guid, at: Wall, number: u64) -> Guid {
+        self.named(&format!("{consumer}/session/{}/{number}", at.0))
+    }
+
     /// The service that a readable GUID of this fleet names; none for any other GUID.
     pub fn service(&self, guid: Guid) -> Option<Source> {
         let bits = u128::from_be_bytes(guid.0);
@@ -164,6 +170,17 @@ mod tests {
         assert!(
             guids(GuidForm::Readable).of_service(source(400, 37)).to_string().starts_with("00000000-0190-8")
         );
+    }
+
+    #[test]
+    fn sessions_differ_by_consumer_time_and_number() {
+        let guids = guids(GuidForm::Readable);
+        let (one, other) = (guids.of_service(source(1, 100)), guids.of_service(source(2, 100)));
+        let session = guids.of_session(one, Wall(5), 1);
+        assert_eq!(session, guids.of_session(one, Wall(5), 1));
+        let others = [(other, 5, 1), (one, 6, 1), (one, 5, 2)];
+        assert!(others.iter().all(|&(who, at, number)| guids.of_session(who, Wall(at), number) != session));
+        assert!(session.is_rfc4122());
     }
 
     #[test]

@@ -59,6 +59,8 @@ impl ServiceId {
     pub const HEALTH: Self = Self(NonZeroU32::MIN.saturating_add(1));
     /// The log service of every node.
     pub const LOG: Self = Self(NonZeroU32::MIN.saturating_add(2));
+    /// The arbiter of an entity's resources (UMAA ResourceAllocation), where it has one.
+    pub const ALLOCATION: Self = Self(NonZeroU32::MIN.saturating_add(9));
 
     /// A service id from its number.
     ///
@@ -161,7 +163,7 @@ mod tests {
         assert_eq!(EntityId::new(1 << 48), Err(IdError::Entity(1 << 48)));
         assert!(ServiceId::new(u64::from(u32::MAX)).is_ok());
         assert_eq!(ServiceId::new(1 << 32), Err(IdError::Service(1 << 32)));
-        assert_eq!(ServiceId::LOG.get(), 3);
+        assert_eq!((ServiceId::LOG.get(), ServiceId::ALLOCATION.get()), (3, 10));
     }
 
     #[test]

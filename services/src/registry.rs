@@ -4,6 +4,7 @@ use crate::health::Health;
 use crate::log::Log;
 use crate::service::{Input, Outbox, Service, ServiceSpec};
 use crate::track::{Track, TrackConfig};
+use crate::umaa::allocation::{Arbiter, Arbitration};
 use aldis_envelope::{EntityId, Guids, Now, ServiceId, Source};
 use std::sync::Arc;
 use std::time::Duration;
@@ -20,6 +21,8 @@ pub enum Kind {
     },
     /// Service 3.
     Log,
+    /// Service 10, where an entity has resources: gives control of them to one consumer at a time.
+    Arbiter(Arbitration),
     /// A vehicle that moves along a simple track and tells where it is.
     Track(TrackConfig),
 }
@@ -50,6 +53,11 @@ pub fn built_in(entity: EntityId, guids: &Guids, health_period: Duration) -> Vec
     ]
 }
 
+/// The arbiter of an entity's resources.
+pub fn arbiter(entity: EntityId, guids: &Guids, arbitration: Arbitration) -> ServiceSpec {
+    service(Source::new(entity, ServiceId::ALLOCATION), "arbiter", Kind::Arbiter(arbitration), guids)
+}
+
 /// The service that answers pings for a bridge, which is no service itself.
 pub(crate) fn stand_in(source: Source, name: &str) -> ServiceSpec {
     ServiceSpec { source, name: name.to_owned(), factory: Arc::new(|| Box::new(StandIn)) }
@@ -63,6 +71,7 @@ pub fn service(source: Source, name: &str, kind: Kind, guids: &Guids) -> Service
             Kind::Node => Box::new(StandIn),
             Kind::Health { period } => Box::new(Health::new(source.entity, guids.clone(), *period)),
             Kind::Log => Box::new(Log::new(source.entity, &guids)),
+            Kind::Arbiter(arbitration) => Box::new(Arbiter::new(source, &guids, arbitration.clone())),
             Kind::Track(track) => Box::new(Track::new(source, track.clone())),
         }
     });

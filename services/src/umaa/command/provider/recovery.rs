@@ -1,0 +1,189 @@
+//! What a provider does with what its former life left on the bus (ICD 4.1.2.1).
+//!
+//! | on the bus | what is done |
+//! | --- | --- |
+//! | a command without a status | ISSUED first, then on |
+//! | with a status that is not terminal | its executor goes on from there, or it fails with SERVICE_FAILED |
+//! | with a terminal one | nothing is published, the consumer's dispose is awaited |
+//! | updated since it was acknowledged | as the update that it is |
+//! | status, acknowledgement or execution status without their command | disposed, once the command cannot come any more |
+
+use super::super::decisions::{is_orphan, is_update};
+use super::super::executor::{Admission, Commanded, Executor, Failure, FailureKind, SessionId};
+use super::super::session::{Event, Session};
+use super::super::writer::is_about;
+use super::{Provider, Stage};
+use crate::service::Outbox;
+use aldis_envelope::umaa::{self, Command, CommandAckReport, CommandState, CommandStatus, Key, Topic};
+use aldis_envelope::{Change, Envelope, Guid, KeyHash, Monotonic, Now, Source};
+use std::collections::BTreeMap;
+
+/// What a former life said of one session.
+struct Left<C> {
+    state: Option<CommandState>,
+    ack: Option<CommandAckReport<C>>,
+    execution_status: bool,
+    /// Whether the consumer is known to be alive.
+    consumer_is_here: bool,
+}
+
+impl<C> Default for Left<C> {
+    fn default() -> Self {
+        Self { state: None, ack: None, execution_status: false, consumer_is_here: false }
+    }
+}
+
+/// All that a former life said, by session.
+pub(super) struct Past<C> {
+    left: BTreeMap<Guid, Left<C>>,
+    /// When what has found no command is given up.
+    wait_ends: Option<Monotonic>,
+}
+
+impl<C> Default for Past<C> {
+    fn default() -> Self {
+        Self { left: BTreeMap::new(), wait_ends: None }
+    }
+}
+
+impl<C> Past<C> {
+    pub(super) fn next_deadline(&self) -> Option<Monotonic> {
+        self.wait_ends.filter(|_| !self.left.is_empty())
+    }
+}
+
+impl<C: Command, E: Executor<C>, A: Admission> Provider<C, E, A> {
+    /// A sample of a former life: told by the own node, or by one that retains it for this one.
+    pub(super) fn remember(&mut self, envelope: &Envelope) {
+        if self.stage != Stage::Listening || envelope.message.change != Change::Put {
+            return;
+        }
+        let content = &envelope.message.content;
+        if is_about::<CommandStatus<C>>(envelope) {
+            let status = umaa::decode::<CommandStatus<C>>(content);
+            if let Ok(status) = status
+                && let Some(left) = self.left_of(status.key())
+            {
+                left.state = Some(status.command_status);
+            }
+        } else if is_about::<CommandAckReport<C>>(envelope) {
+            let ack = umaa::decode::<CommandAckReport<C>>(content);
+            let own = envelope.message.label.source();
+            if let Ok(ack) = ack
+                && let consumer = self.guids.service(ack.command.header().source)
+                && let Some(left) = self.left_of(ack.key())
+            {
+                // Of a consumer on the own entity no token is told; what it retains always is.
+                left.consumer_is_here |= consumer.is_some_and(|consumer| consumer.entity == own.entity);
+                left.ack = Some(ack);
+            }
+        } else if is_about::<C::ExecutionStatus>(envelope) {
+            let status = umaa::decode::<C::ExecutionStatus>(content);
+            if let Ok(status) = status
+                && let Some(left) = self.left_of(status.key())
+            {
+                left.execution_status = true;
+            }
+        }
+    }
+
+    fn left_of(&mut self, key: aldis_envelope::umaa::SessionKey) -> Option<&mut Left<C>> {
+        let room = self.past.left.len() < self.most_held() || self.past.left.contains_key(&key.session_id);
+        (key.source == self.guid && room).then(|| self.past.left.entry(key.session_id).or_default())
+    }
+
+    /// A service appeared or vanished.
+    pub(super) fn alive(&mut self, source: Source, alive: bool) {
+        for left in self.past.left.values_mut() {
+            let consumer = left.ack.as_ref().and_then(|ack| self.guids.service(ack.command.header().source));
+            if consumer == Some(source) {
+                left.consumer_is_here = alive;
+            }
+        }
+    }
+
+    /// All of the past that is to be had is known: serves the commands that wait, and gives up what has none.
+    pub(super) fn recover(&mut self, now: Now, all_is_told: bool, out: &mut Outbox) {
+        if self.stage != Stage::Listening {
+            return;
+        }
+        self.stage = Stage::Serving;
+        for (_, (command, writer)) in std::mem::take(&mut self.waiting) {
+            self.take(now, command, writer, out);
+        }
+        self.past.wait_ends = Some(now.monotonic + self.settings.orphans_wait);
+        self.give_up_orphans(now, all_is_told, out);
+    }
+
+    /// Goes on with a command that a former life knew; false where it did not.
+    pub(super) fn adopt(
+        &mut self,
+        now: Now,
+        id: SessionId,
+        command: &C,
+        writer: Source,
+        out: &mut Outbox,
+    ) -> bool {
+        let Some(left) = self.past.left.remove(&id.session) else { return false };
+        let known = left.ack.map(|ack| ack.command).unwrap_or_else(|| command.clone());
+        let header = known.header();
+        let Some(state) = left.state.filter(|_| header.source == id.source) else {
+            self.dispose_past(id.session, left.execution_status, out);
+            return false;
+        };
+        let limit = self.limit(now.monotonic, state);
+        let is_updated = is_update(header.time_stamp, command.header().time_stamp);
+        let held = self.hold(id, known, writer, Session::in_state(state));
+        held.has_execution_status = left.execution_status;
+        held.limit = limit;
+        held.was_started = matches!(state, CommandState::Commanded | CommandState::Executing);
+        if is_updated {
+            held.newest = command.header().time_stamp;
+            held.update = Some(command.clone());
+            self.drive(now, id, Event::Updated, out);
+        } else if !state.is_terminal() {
+            let goes_on = self.executor.recover(now, Commanded { id, command, writer }, state);
+            let text = "it cannot go on after the restart of its provider";
+            let event = match goes_on {
+                true => Event::Resumed,
+                false => Event::Failed(Failure::new(FailureKind::Service, text)),
+            };
+            self.drive(now, id, event, out);
+        }
+        true
+    }
+
+    /// The command of something that waits for one has been disposed.
+    pub(super) fn past_disposed(&mut self, command: KeyHash, out: &mut Outbox) {
+        let is_of = |left: &Left<C>| {
+            left.ack.as_ref().is_some_and(|ack| ack.command.key().instance().hash == command)
+        };
+        let session = self.past.left.iter().find(|(_, left)| is_of(left)).map(|(&session, _)| session);
+        if let Some(session) = session.filter(|_| self.stage == Stage::Serving)
+            && let Some(left) = self.past.left.remove(&session)
+        {
+            self.dispose_past(session, left.execution_status, out);
+        }
+    }
+
+    pub(super) fn give_up_orphans(&mut self, now: Now, all_is_told: bool, out: &mut Outbox) {
+        let Some(wait_ends) = self.past.wait_ends else { return };
+        let orphan =
+            |left: &Left<C>| is_orphan(all_is_told && left.consumer_is_here, now.monotonic, wait_ends);
+        let orphans = self.past.left.iter().filter(|(_, left)| orphan(left));
+        let orphans: Vec<_> = orphans.map(|(&session, left)| (session, left.execution_status)).collect();
+        for (session, execution_status) in orphans {
+            self.past.left.remove(&session);
+            self.dispose_past(session, execution_status, out);
+        }
+    }
+
+    fn dispose_past(&self, session: Guid, execution_status: bool, out: &mut Outbox) {
+        let key = self.key(session);
+        self.statuses.dispose(key, out);
+        self.acks.dispose(key, out);
+        if execution_status {
+            self.executions.dispose(key, out);
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! Flow control and ResourceAllocation on a simulated bus, watched from outside.
+
+pub(crate) mod asking;
+pub(crate) mod bus;
+pub(crate) mod checker;
+pub(crate) mod sea;
+pub(crate) mod vector;
