@@ -1,5 +1,6 @@
 //! The command line.
 
+mod allocation;
 mod bench;
 mod call;
 mod check;
@@ -62,6 +63,12 @@ enum Command {
     Call(call::CallArgs),
     /// Show who is there.
     Fleet(fleet::FleetArgs),
+    /// Take control of a resource, and hold it.
+    Allocate(allocation::Allocate),
+    /// Have a running `aldis allocate` give its resource back.
+    Release(allocation::Release),
+    /// Show or set who may control which resource.
+    Priority(allocation::Priority),
     /// Record envelopes into a file.
     Record(record::Record),
     /// Send a recording again.
@@ -87,6 +94,9 @@ pub(crate) fn main() -> ExitCode {
         Command::Sub(args) => args.run(),
         Command::Call(args) => args.run(),
         Command::Fleet(args) => args.run(),
+        Command::Allocate(args) => args.run(),
+        Command::Release(args) => args.run(),
+        Command::Priority(args) => args.run(),
         Command::Record(args) => args.run(),
         Command::Replay(args) => args.run(),
         Command::Health(args) => args.run(),

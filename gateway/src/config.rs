@@ -14,6 +14,7 @@ mod entities;
 mod error;
 mod locator;
 mod read;
+mod resource;
 mod schema;
 mod service;
 mod text;
@@ -26,12 +27,14 @@ pub(crate) use bus::Bus;
 pub(crate) use entities::{Entities, Operators};
 pub(crate) use error::ConfigError;
 pub(crate) use locator::Locator;
+pub(crate) use resource::{Allocation, Party, Resource};
 pub(crate) use schema::schema;
 pub(crate) use service::Service;
 pub(crate) use text::PlainName;
 pub(crate) use topic::Topic;
 
-use aldis_envelope::{Fleet, GuidForm, Prefix};
+use aldis_envelope::{Fleet, GuidForm, Guids, Prefix};
+use aldis_services::umaa::allocation::Arbitration;
 use error::Fault;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -69,6 +72,12 @@ pub(crate) struct Config {
     /// Who may call what, beyond the defaults.
     #[serde(default)]
     pub(crate) allow: Vec<Allow>,
+    /// What the node's arbiter gives control of.
+    #[serde(default, rename = "resource")]
+    pub(crate) resources: Vec<Resource>,
+    /// How the arbiter works.
+    #[serde(default)]
+    pub(crate) allocation: Allocation,
     /// What topics promise to their readers, where it is not what the patterns of UMAA say.
     #[serde(default, rename = "topic")]
     pub(crate) topics: Vec<Topic>,
@@ -102,6 +111,19 @@ impl Config {
     /// [`ConfigError`] with the place and the cure of every mistake found.
     pub(crate) fn parse(file: &str, text: &str) -> Result<Self, ConfigError> {
         read::read(file, text)
+    }
+}
+
+impl Config {
+    /// What the node's arbiter is told; none where it has none. A configuration that was read has been checked.
+    pub(crate) fn arbitration(&self) -> Option<Arbitration> {
+        self.checked_arbitration().ok().flatten()
+    }
+
+    fn checked_arbitration(&self) -> Result<Option<Arbitration>, Fault> {
+        let guids = Guids::new(&self.fleet, self.guid);
+        let operators = self.operators.iter().collect();
+        resource::arbitration(self.entities.own(), &guids, (&self.resources, &self.allocation), operators)
     }
 }
 

@@ -107,6 +107,19 @@ fn answer(envelope: &Envelope, elapsed: Duration) -> Value {
 }
 
 impl CallArgs {
+    /// A request without content.
+    pub(super) fn request(
+        address: Address,
+        request: &str,
+        within: Within,
+        json: bool,
+        join: Join,
+    ) -> Result<Self, Failure> {
+        let request = Some(descriptor(request).map_err(Failure::Usage)?);
+        let content_type = ContentType::Aldis;
+        Ok(Self { address, ping: false, request, content_type, text: None, file: None, within, json, join })
+    }
+
     pub(crate) fn run(self) -> Result<(), Failure> {
         let content = match (&self.text, &self.file) {
             (Some(text), _) => Bytes::from(text.clone()),

@@ -47,6 +47,11 @@ impl Join {
         Ok(Guids::new(&config.fleet, config.guid))
     }
 
+    /// The entity that it joins as.
+    pub(crate) fn own(&self) -> Result<EntityId, Failure> {
+        Ok(self.load()?.entities.own())
+    }
+
     /// The fleet that it joins.
     pub(crate) fn fleet(&self) -> Result<Fleet, Failure> {
         Ok(self.load()?.fleet)
@@ -113,9 +118,19 @@ pub(crate) struct Member {
 }
 
 impl Member {
-    /// Joins the fleet with a desk.
+    /// Joins the fleet with a desk, as a service that nobody else is.
     pub(crate) fn join<D: Desk + 'static>(
         join: &Join,
+        prefixes: Vec<Prefix>,
+        desk: D,
+    ) -> Result<Self, Failure> {
+        Self::join_as(join, free_service(), prefixes, desk)
+    }
+
+    /// Joins the fleet with a desk, as a service that others know by its id.
+    pub(crate) fn join_as<D: Desk + 'static>(
+        join: &Join,
+        service: ServiceId,
         prefixes: Vec<Prefix>,
         desk: D,
     ) -> Result<Self, Failure> {
@@ -123,8 +138,7 @@ impl Member {
         let outside =
             runtime::outside(&config).map_err(|why: bus::BusError| Failure::Usage(why.to_string()))?;
         let mut node = runtime::node_config(&config);
-        node.services =
-            vec![desk_service(Source::new(config.entities.own(), free_service()), prefixes, desk)];
+        node.services = vec![desk_service(Source::new(config.entities.own(), service), prefixes, desk)];
         node.bridges.clear();
         // A command comes and goes: nobody is to wait for it.
         node.reliable = false;

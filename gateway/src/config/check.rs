@@ -14,6 +14,7 @@ pub(super) fn check(config: &Config) -> Vec<Fault> {
     bridges(config, &mut faults);
     services(config, &mut faults);
     health(config, &mut faults);
+    faults.extend(config.checked_arbitration().err());
     faults
 }
 

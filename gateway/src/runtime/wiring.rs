@@ -40,6 +40,7 @@ pub(crate) fn node_config(config: &Config) -> NodeConfig {
     let own = config.entities.own();
     let guids = Guids::new(&config.fleet, config.guid);
     let mut services = registry::built_in(own, &guids, config.health.report_period());
+    services.extend(config.arbitration().map(|arbitration| registry::arbiter(own, &guids, arbitration)));
     services.extend(config.services.iter().map(|service| configured(own, service, &guids)));
     NodeConfig {
         fleet: config.fleet.clone(),

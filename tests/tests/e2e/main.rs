@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by a panic, in its helpers too")]
 
 mod access;
+mod allocation;
 mod calls;
 mod foreign;
 mod observe;
