@@ -4,6 +4,7 @@ mod allocation;
 mod bench;
 mod call;
 mod check;
+mod command;
 mod content;
 mod demo;
 mod exit;
@@ -69,6 +70,8 @@ enum Command {
     Release(allocation::Release),
     /// Show or set who may control which resource.
     Priority(allocation::Priority),
+    /// Follow UMAA commands.
+    Command(command::CommandArgs),
     /// Record envelopes into a file.
     Record(record::Record),
     /// Send a recording again.
@@ -97,6 +100,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Allocate(args) => args.run(),
         Command::Release(args) => args.run(),
         Command::Priority(args) => args.run(),
+        Command::Command(args) => args.run(),
         Command::Record(args) => args.run(),
         Command::Replay(args) => args.run(),
         Command::Health(args) => args.run(),

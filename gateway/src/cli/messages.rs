@@ -223,7 +223,7 @@ impl Subscribe {
 }
 
 /// A message for machines.
-fn envelope_json(envelope: &Envelope) -> Value {
+pub(super) fn envelope_json(envelope: &Envelope) -> Value {
     let Envelope { message, stamp } = envelope;
     let attributes = &message.label.attributes;
     json!({
