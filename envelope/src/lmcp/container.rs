@@ -24,6 +24,7 @@ pub const CONTAINER: usize = PREFIX + 4;
 pub fn decode(message: &[u8]) -> Result<Box<dyn Object>, DecodeError> {
     decode_root(message, |header, reader| {
         let mut object = (header.type_info().or_else(|fault| reader.fail_header(fault))?.default)();
+        reader.allocate(size_of_val(object.as_ref()))?;
         object.decode_fields(reader)?;
         Ok(object)
     })
