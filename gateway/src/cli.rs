@@ -7,9 +7,11 @@ mod content;
 mod demo;
 mod exit;
 mod fleet;
+mod lmcp;
 mod member;
-mod messages;
+mod publish;
 mod run;
+mod subscribe;
 mod telemetry;
 mod within;
 
@@ -50,13 +52,15 @@ enum Command {
     /// Print the JSON Schema of a configuration.
     Schema(check::Schema),
     /// Publish a message.
-    Pub(messages::Publish),
+    Pub(publish::Publish),
     /// Show messages as they come.
-    Sub(messages::Subscribe),
+    Sub(subscribe::Subscribe),
     /// Call a service, a mailbox or all services of an entity.
     Call(call::CallArgs),
     /// Show who is there.
     Fleet(fleet::FleetArgs),
+    /// Read, write and check LMCP messages in files.
+    Lmcp(lmcp::Lmcp),
     /// Measure this machine, side by side with the limit.
     Bench(bench::Bench),
 }
@@ -74,6 +78,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Sub(args) => args.run(),
         Command::Call(args) => args.run(),
         Command::Fleet(args) => args.run(),
+        Command::Lmcp(args) => args.run(),
         Command::Bench(args) => args.run(),
     };
     match done {

@@ -23,6 +23,12 @@ impl DecodeError {
         Self { fault, offset, path: FieldPath::default() }
     }
 
+    /// The same error, seen from bytes that have `before` more in front.
+    pub fn after(mut self, before: usize) -> Self {
+        self.offset += before;
+        self
+    }
+
     /// The same error, seen from the object that has the field.
     #[cold]
     pub(super) fn in_field(mut self: Box<Self>, name: &'static str) -> Box<Self> {

@@ -2,7 +2,7 @@
 
 use super::exit::Failure;
 use aldis_envelope::umaa::{self, HealthReport, LogReport, Topic};
-use aldis_envelope::{ContentType, Descriptor, Label, aldis};
+use aldis_envelope::{ContentType, Descriptor, Label, aldis, lmcp};
 use bytes::Bytes;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -17,8 +17,9 @@ pub(super) fn content_type(text: &str) -> Result<ContentType, String> {
     ContentType::new(text).map_err(|why| why.to_string())
 }
 
-/// A content for people and machines: read where its type is known, otherwise its bytes in hexadecimal.
-pub(super) fn content_text(label: &Label, content: &[u8]) -> Value {
+/// A content for people and machines: read where its type is known, LMCP where it is to be decoded, otherwise its bytes
+/// in hexadecimal.
+pub(super) fn content_text(label: &Label, content: &[u8], decode: bool) -> Value {
     let read = match (label.descriptor(), &label.attributes.content_type) {
         (HealthReport::NAME, ContentType::Umaa) => {
             umaa::decode::<HealthReport>(content).ok().map(|r| umaa_text(&r))
@@ -27,9 +28,18 @@ pub(super) fn content_text(label: &Label, content: &[u8]) -> Value {
         (aldis::NODE_STATUS, ContentType::Aldis) => {
             aldis::decode::<aldis::NodeStatus>(content).map(|s| status_text(&s))
         }
+        (_, ContentType::Lmcp) if decode && !content.is_empty() => return lmcp_text(content),
         _ => None,
     };
     read.unwrap_or_else(|| json!({ "bytes": content.len(), "hex": hex(content) }))
+}
+
+/// An LMCP message; one that cannot be decoded as its bytes, with what is wrong.
+fn lmcp_text(content: &[u8]) -> Value {
+    match lmcp::decode(content) {
+        Ok(object) => lmcp::to_json(object.as_ref()),
+        Err(why) => json!({ "bytes": content.len(), "hex": hex(content), "error": why.to_string() }),
+    }
 }
 
 fn umaa_text(report: &HealthReport) -> Value {

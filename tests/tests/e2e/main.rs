@@ -5,6 +5,7 @@
 mod access;
 mod calls;
 mod foreign;
+mod lmcp;
 mod relay;
 mod run;
 mod stream;

@@ -7,7 +7,7 @@ use crate::lmcp::cmasi::{AirVehicleState, KeyValuePair, Location3D, LoiterAction
 use crate::lmcp::cmasi::{MissionCommand, RemoveTasks};
 use crate::lmcp::{
     DecodeFault, EncodeFault, Header, Kind, Object, Ref, Slot, TypeInfo, checksum, decode, decode_as,
-    descendants, encode, natural_key, position, types,
+    descendants, encode, natural_key, position, split, types,
 };
 
 /// Everything that reads bytes.
@@ -110,6 +110,25 @@ fn the_container_is_checked() {
     assert_eq!(
         fault(&[76, 77, 67, 80, 0, 0, 0, 1, 0, 0, 0, 0, 0]),
         (DecodeFault::NullRoot, 8, String::new())
+    );
+}
+
+#[test]
+fn messages_that_follow_one_another_are_split() {
+    let (place, pair) = (encode(&Location3D::default()).unwrap(), encode(&KeyValuePair::default()).unwrap());
+    let both = [&place[..], &pair].concat();
+    assert_eq!(split(&both).collect::<Result<Vec<_>, _>>().unwrap(), [&place[..], &pair]);
+    assert_eq!(split(b"").count(), 0);
+    let end = place.len();
+    for (length, offset) in [(end + 3, end), (end + 9, end + 4), (both.len() - 1, end + 4)] {
+        let parts: Vec<_> = split(&both[..length]).collect();
+        assert_eq!((parts.len(), parts[0].as_ref().unwrap()), (2, &&place[..]));
+        assert_eq!(parts[1].as_ref().unwrap_err().offset, offset);
+    }
+    let junk = [&place[..], b"junk and more"].concat();
+    assert_eq!(
+        split(&junk).last().unwrap().unwrap_err().to_string(),
+        format!("not an LMCP message, at byte {end}")
     );
 }
 
