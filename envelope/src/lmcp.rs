@@ -4,7 +4,7 @@
 //! read the declaration make a plain Rust struct of it, and its place in the schema. What every type
 //! can do then follows:
 //!
-//! - **Binary**: [`decode`], [`decode_as`], [`encode`]. What is decoded is encoded to the same bytes.
+//! - **Binary**: [`decode`], [`decode_as`], [`encode`], [`split`]. What is decoded is encoded to the same bytes.
 //!   A type or version that is not declared here is told ([`DecodeError::is_unknown_type`]), so that
 //!   its message is carried as it is.
 //! - **Without decoding**: [`Header::peek`], [`natural_key`], [`position`].
@@ -66,7 +66,7 @@ pub mod vehicles;
 #[cfg(test)]
 mod tests;
 
-pub use container::{CONTAINER, MAGIC, checksum, decode, decode_as, encode, encode_into};
+pub use container::{CONTAINER, MAGIC, checksum, decode, decode_as, encode, encode_into, split};
 pub use error::{DecodeError, DecodeFault, EncodeError, EncodeFault, FieldPath};
 pub use json::{JsonError, JsonFault, from_json, to_json};
 pub use key::{KEYED, Keyed, key_of, natural_key};
@@ -74,10 +74,10 @@ pub use list::LargeArray;
 pub use object::{Object, Struct};
 pub use peek::{Position, position};
 pub use reader::{DEPTH_MAX, Decoded, Header, MEMORY_FACTOR, MEMORY_FLOOR, Reader};
-pub use reference::Ref;
+pub use reference::{Inline, Place, Ref};
 pub use registry::{descendants, type_in, type_of, types};
 pub use schema::{Count, EnumInfo, FieldInfo, Kind, Series, SeriesName, TypeInfo};
-pub use value::{Enumeration, List, Reference, Slot, Value, View};
-pub use verify::{Verification, verify};
+pub use value::{Enumeration, List, Reference, Slot, Text, Value, View};
+pub use verify::{Verification, XmlVerification, verify, verify_xml};
 pub use writer::{Encoded, Writer};
 pub use xml::{Document, Placed, Warning, WarningKind, XmlError, XmlFault, XmlTextError, read_xml, to_xml};

@@ -10,13 +10,15 @@ mod demo;
 mod exit;
 mod fleet;
 mod health;
+mod lmcp;
 mod log;
 mod member;
-mod messages;
+mod publish;
 mod record;
 mod replay;
 mod retained;
 mod run;
+mod subscribe;
 mod telemetry;
 mod within;
 
@@ -57,9 +59,9 @@ enum Command {
     /// Print the JSON Schema of a configuration.
     Schema(check::Schema),
     /// Publish a message.
-    Pub(messages::Publish),
+    Pub(publish::Publish),
     /// Show messages as they come.
-    Sub(messages::Subscribe),
+    Sub(subscribe::Subscribe),
     /// Call a service, a mailbox or all services of an entity.
     Call(call::CallArgs),
     /// Show who is there.
@@ -80,6 +82,8 @@ enum Command {
     Health(health::HealthArgs),
     /// Show the log that a node keeps of the fleet.
     Log(log::LogArgs),
+    /// Read, write and check LMCP messages in files.
+    Lmcp(lmcp::Lmcp),
     /// Measure this machine, side by side with the limit.
     Bench(bench::Bench),
 }
@@ -105,6 +109,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Replay(args) => args.run(),
         Command::Health(args) => args.run(),
         Command::Log(args) => args.run(),
+        Command::Lmcp(args) => args.run(),
         Command::Bench(args) => args.run(),
     };
     match done {

@@ -21,7 +21,7 @@ fn help_teaches_by_example_and_tells_the_exit_codes() {
     for part in ["aldis demo", "aldis run configs/shore.toml", "Exit codes", "3 nobody is there"] {
         assert!(help.contains(part), "{part}: {help}");
     }
-    for verb in ["run", "check", "acl", "pub", "sub", "call", "fleet", "demo"] {
+    for verb in ["run", "check", "acl", "pub", "sub", "call", "fleet", "demo", "lmcp", "bench"] {
         assert!(stdout(&aldis(&[verb, "--help"])).contains("Example"), "{verb}");
     }
 }

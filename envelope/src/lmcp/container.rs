@@ -24,6 +24,7 @@ pub const CONTAINER: usize = PREFIX + 4;
 pub fn decode(message: &[u8]) -> Result<Box<dyn Object>, DecodeError> {
     decode_root(message, |header, reader| {
         let mut object = (header.type_info().or_else(|fault| reader.fail_header(fault))?.default)();
+        reader.allocate(size_of_val(object.as_ref()))?;
         object.decode_fields(reader)?;
         Ok(object)
     })
@@ -44,6 +45,31 @@ pub fn decode_as<T: Struct>(message: &[u8]) -> Result<T, DecodeError> {
         object.decode_fields(reader)?;
         Ok(object)
     })
+}
+
+/// The messages that follow one another in some bytes, as a file of them holds them. What is inside a message is not
+/// looked at. After an error there are no more: where the next message begins is not known.
+pub fn split(bytes: &[u8]) -> impl Iterator<Item = Result<&[u8], DecodeError>> {
+    let mut offset = 0;
+    std::iter::from_fn(move || {
+        let rest = bytes.get(offset..).filter(|rest| !rest.is_empty())?;
+        let length = first_length(rest);
+        offset = length.as_ref().map_or(bytes.len(), |length| offset + length);
+        Some(length.map(|length| &rest[..length]).map_err(|error| error.after(bytes.len() - rest.len())))
+    })
+}
+
+/// The length of the message that the bytes begin with.
+fn first_length(bytes: &[u8]) -> Result<usize, DecodeError> {
+    let Some(&[m0, m1, m2, m3, s0, s1, s2, s3]) = bytes.first_chunk::<PREFIX>() else {
+        return root(bytes).map(|_| bytes.len());
+    };
+    let declared = u64::from(u32::from_be_bytes([s0, s1, s2, s3])) + CONTAINER as u64;
+    match usize::try_from(declared) {
+        _ if [m0, m1, m2, m3] != MAGIC => Err(DecodeError::new(DecodeFault::NotLmcp, 0)),
+        Ok(length) if length <= bytes.len() => Ok(length),
+        _ => Err(DecodeError::new(DecodeFault::Length { declared, found: bytes.len() }, MAGIC.len())),
+    }
 }
 
 /// Encodes an object as a message, with its checksum.

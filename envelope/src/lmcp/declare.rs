@@ -15,8 +15,13 @@
 //!     }
 //!     /// A place of a route.
 //!     35 Waypoint: Location3D { number "Number": i64 }
+//!     /// What every task has.
+//!     8 Task in Box { task_id "TaskID": i64 }
 //! }
 //! ```
+//!
+//! `in Box` is for a type that fields hold seldom or in the form of its descendants: an object of it stands behind a
+//! pointer, so that a field without one stays small.
 
 /// Declares enumerations of the model: numbers, the declared ones with names. The first is the default.
 macro_rules! lmcp_enums {
@@ -77,7 +82,7 @@ macro_rules! lmcp_types {
         $series:ident $namespace:literal;
         $(
             $(#[$doc:meta])*
-            $id:literal $name:ident $(: $parent:ident)? {
+            $id:literal $name:ident $(: $parent:ident)? $(in $place:ident)? {
                 $($field:ident $wire:literal $([$unit:literal])? : $type:ty $(= $default:expr)?),* $(,)?
             }
         )*
@@ -114,6 +119,7 @@ macro_rules! lmcp_types {
             }
 
             impl $crate::lmcp::Struct for $name {
+                type Place = lmcp_types!(@place $name $($place)?);
                 const TYPE: &'static $crate::lmcp::TypeInfo = &$crate::lmcp::TypeInfo {
                     series: &$series,
                     id: $id,
@@ -190,6 +196,8 @@ macro_rules! lmcp_types {
             }
         )*
     };
+    (@place $name:ident) => { $crate::lmcp::Inline<$name> };
+    (@place $name:ident $place:ident) => { $place<$name> };
     (@deref $name:ident $parent:ident) => {
         impl std::ops::Deref for $name {
             type Target = $parent;

@@ -23,6 +23,12 @@ impl DecodeError {
         Self { fault, offset, path: FieldPath::default() }
     }
 
+    /// The same error, seen from bytes that have `before` more in front.
+    pub fn after(mut self, before: usize) -> Self {
+        self.offset += before;
+        self
+    }
+
     /// The same error, seen from the object that has the field.
     #[cold]
     pub(super) fn in_field(mut self: Box<Self>, name: &'static str) -> Box<Self> {
@@ -196,6 +202,9 @@ pub struct FieldPath {
     steps: Vec<Step>,
 }
 
+/// What one step of a path takes in memory.
+pub(super) const PATH_STEP: usize = size_of::<Step>();
+
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Step {
     Field(&'static str),
@@ -209,11 +218,17 @@ impl FieldPath {
     }
 
     pub(super) fn push_field(&mut self, name: &'static str) {
-        self.steps.push(Step::Field(name));
+        self.push(Step::Field(name));
     }
 
     pub(super) fn push_index(&mut self, index: usize) {
-        self.steps.push(Step::Index(index));
+        self.push(Step::Index(index));
+    }
+
+    /// Room for this one step alone, so that what an error takes is known.
+    fn push(&mut self, step: Step) {
+        self.steps.reserve_exact(1);
+        self.steps.push(step);
     }
 }
 

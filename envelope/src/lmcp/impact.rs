@@ -1,6 +1,5 @@
 //! The IMPACT series: play-calling tasks, points, lines and areas of interest, radio and water.
 
-use super::Ref;
 use super::cmasi::{
     AbstractGeometry, AbstractZone, AltitudeType, AutomationRequest, AutomationResponse, EntityConfiguration,
     EntityState, Location3D, LoiterAction, PayloadConfiguration, PayloadState, SearchTask, Task,
@@ -8,6 +7,7 @@ use super::cmasi::{
 };
 use super::registry::table;
 use super::schema::{Series, SeriesName, TypeInfo};
+use super::{Ref, Text};
 
 /// The series as the wire and the XML form know it.
 pub const SERIES: Series =
@@ -115,7 +115,7 @@ lmcp_types! {
         request_id "RequestID": i64,
         vehicles "Vehicles": Vec<i64>,
         task_list "TaskList": Vec<i64>,
-        task_relationships "TaskRelationships": String,
+        task_relationships "TaskRelationships": Text,
         inter_task_percentage "InterTaskPercentage": Vec<f32>,
         operating_region "OperatingRegion": i64,
     }
@@ -184,7 +184,7 @@ lmcp_types! {
         point_id "PointID": i64,
         location "Location": Ref<Location3D>,
         point_action "PointAction": AreaActionOptions,
-        point_label "PointLabel": String,
+        point_label "PointLabel": Text,
         background_behavior_point "BackgroundBehaviorPoint": bool,
     }
 
@@ -193,7 +193,7 @@ lmcp_types! {
         line_id "LineID": i64,
         line "Line": Vec<Ref<Location3D>>,
         line_action "LineAction": AreaActionOptions,
-        line_label "LineLabel": String,
+        line_label "LineLabel": Text,
         background_behavior_line "BackgroundBehaviorLine": bool,
     }
 
@@ -202,7 +202,7 @@ lmcp_types! {
         area_id "AreaID": i64,
         area "Area": Ref<AbstractGeometry>,
         area_action "AreaAction": AreaActionOptions,
-        area_label "AreaLabel": String,
+        area_label "AreaLabel": Text,
         background_behavior_area "BackgroundBehaviorArea": bool,
     }
 

@@ -127,7 +127,11 @@ fn decode_elements<T: Value>(list: &mut Vec<T>, count: usize, reader: &mut Reade
         let read = list.len();
         let room = (reader.left() / const { T::KIND.size_full() } + 1).max(read).min(count - read);
         reader.allocate((read + room).saturating_mul(size_of::<T>()))?;
-        list.reserve_exact(room);
+        if read == 0 {
+            *list = Vec::with_capacity(room);
+        } else {
+            list.reserve_exact(room);
+        }
         reader.release(read * size_of::<T>());
         list.resize_with(read + room, T::blank);
         decode_in_place(list, read, reader)?;

@@ -4,6 +4,7 @@ use std::any::Any;
 use std::fmt;
 
 use super::reader::{Decoded, Reader};
+use super::reference::Place;
 use super::schema::{FieldInfo, TypeInfo};
 use super::value::{List, Slot, View};
 use super::writer::{Encoded, Writer};
@@ -37,6 +38,8 @@ pub trait Object: Any + fmt::Debug + Send + Sync {
 
 /// A declared type, known at compile time.
 pub trait Struct: Object + Clone + Default {
+    /// How a field holds an object of this type: in line, or behind a pointer.
+    type Place: Clone + fmt::Debug + Default + Send + Sync + Place<Self>;
     /// What the model says of it.
     const TYPE: &'static TypeInfo;
 }

@@ -1,6 +1,6 @@
 //! Reads wire values from bytes, within bounds of length, depth and memory.
 
-use super::error::{DecodeError, DecodeFault};
+use super::error::{DecodeError, DecodeFault, PATH_STEP};
 use super::schema::SeriesName;
 use super::value::Value;
 
@@ -12,13 +12,20 @@ pub type Decoded<T> = Result<T, Box<DecodeError>>;
 /// actions, which an attacker can repeat until the stack ends.
 pub const DEPTH_MAX: u8 = 16;
 
-/// Bytes of decoded form that one byte of a message may take. A null in an array is one byte on the
-/// wire and some dozens in memory; arrays of real objects take about three for one.
+/// Bytes of memory that one byte of a message may take while it is decoded, the object and an error counted. Objects with
+/// all texts and arrays empty take up to four for one, in whatever array they stand. Only nulls take more, one byte on the
+/// wire and up to a hundred in memory: a long array of them is refused.
 pub const MEMORY_FACTOR: usize = 4;
 
-/// Bytes of decoded form that any message may take, however short it is. Objects with all texts and
-/// arrays empty take up to eight for one: this is for the 16 of them that the model allows in an array.
-pub const MEMORY_FLOOR: usize = 8 * 1024;
+/// Bytes of memory that any message may take, however short it is: for some nulls, and for the error of a few bytes. So
+/// the factor holds from 512 bytes on.
+pub const MEMORY_FLOOR: usize = 2 * 1024;
+
+/// What an error takes in memory, but for the names of what it is in: it is made in a box and moved out of it.
+const ERROR: usize = 2 * size_of::<DecodeError>();
+
+/// What the names of an error take for one object that it is in: a field and an index, while their list grows.
+const ERROR_LEVEL: usize = 4 * PATH_STEP;
 
 /// A cursor over the bytes of a message.
 #[derive(Debug)]
@@ -33,8 +40,9 @@ pub struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     /// Reads `bytes`, which begin at `offset` of the message.
+    #[inline]
     pub(super) fn new(bytes: &'a [u8], offset: usize) -> Self {
-        let memory = bytes.len().saturating_mul(MEMORY_FACTOR).max(MEMORY_FLOOR);
+        let memory = bytes.len().saturating_mul(MEMORY_FACTOR).max(MEMORY_FLOOR) - ERROR - ERROR_LEVEL;
         Self { rest: bytes, end: offset + bytes.len(), depth: 0, memory }
     }
 
@@ -159,9 +167,11 @@ impl<'a> Reader<'a> {
         if self.depth == DEPTH_MAX {
             return self.fail(DecodeFault::Depth);
         }
+        self.allocate(ERROR_LEVEL)?;
         self.depth += 1;
         let inside = read(self)?;
         self.depth -= 1;
+        self.release(ERROR_LEVEL);
         Ok(inside)
     }
 

@@ -11,14 +11,61 @@ use super::writer::{Encoded, Writer};
 
 /// A field for an object of type `T` or of one that descends from it, or null.
 #[derive(Clone)]
-pub struct Ref<T>(Content<T>);
+pub struct Ref<T: Struct>(Content<T>);
 
-/// An object of the very type stands in line, as most do; only those of descending types are boxed.
+/// An object of the very type stands in line, as most do, or where the type's declaration says; those of descending
+/// types are boxed.
 #[derive(Clone)]
-enum Content<T> {
+enum Content<T: Struct> {
     Null,
-    Exact(T),
+    Exact(T::Place),
     Descendant(Box<dyn Object>),
+}
+
+/// How a field holds an object of the type that it declares.
+pub trait Place<T> {
+    /// Bytes beside the field itself.
+    const APART: usize;
+    /// Puts an object in.
+    fn from_box(object: Box<T>) -> Self;
+    /// The object.
+    fn get(&self) -> &T;
+    /// The object, to be changed.
+    fn get_mut(&mut self) -> &mut T;
+}
+
+/// In line: without a box, where objects of the very type are usual.
+#[derive(Clone, Debug, Default)]
+pub struct Inline<T>(T);
+
+impl<T> Place<T> for Inline<T> {
+    const APART: usize = 0;
+    fn from_box(object: Box<T>) -> Self {
+        Self(*object)
+    }
+    #[inline]
+    fn get(&self) -> &T {
+        &self.0
+    }
+    #[inline]
+    fn get_mut(&mut self) -> &mut T {
+        &mut self.0
+    }
+}
+
+impl<T> Place<T> for Box<T> {
+    const APART: usize = size_of::<T>();
+    fn from_box(object: Self) -> Self {
+        object
+    }
+    #[inline]
+    fn get(&self) -> &T {
+        self
+    }
+    #[inline]
+    fn get_mut(&mut self) -> &mut T {
+        self
+    }
 }
 
 impl<T: Struct> Ref<T> {
@@ -38,7 +85,7 @@ impl<T: Struct> Ref<T> {
     pub fn get(&self) -> Option<&T> {
         match &self.0 {
             Content::Null => None,
-            Content::Exact(object) => Some(object),
+            Content::Exact(place) => Some(place.get()),
             Content::Descendant(object) => object.get(),
         }
     }
@@ -47,7 +94,7 @@ impl<T: Struct> Ref<T> {
     pub fn get_mut(&mut self) -> Option<&mut T> {
         match &mut self.0 {
             Content::Null => None,
-            Content::Exact(object) => Some(object),
+            Content::Exact(place) => Some(place.get_mut()),
             Content::Descendant(object) => object.get_mut(),
         }
     }
@@ -56,7 +103,7 @@ impl<T: Struct> Ref<T> {
     pub fn object(&self) -> Option<&dyn Object> {
         match &self.0 {
             Content::Null => None,
-            Content::Exact(object) => Some(object),
+            Content::Exact(place) => Some(place.get()),
             Content::Descendant(object) => Some(object.as_ref()),
         }
     }
@@ -66,10 +113,15 @@ impl<T: Struct> Ref<T> {
         matches!(self.0, Content::Null)
     }
 
+    /// Reads an object of the very type. All fields are read, so what one is there holds does not matter.
+    #[inline]
     fn decode_exact(&mut self, reader: &mut Reader<'_>) -> Decoded<()> {
-        self.0 = Content::Exact(T::default());
+        reader.allocate(T::Place::APART)?;
+        if !matches!(self.0, Content::Exact(_)) {
+            self.0 = Content::Exact(T::Place::default());
+        }
         match &mut self.0 {
-            Content::Exact(object) => object.decode_fields(reader),
+            Content::Exact(place) => place.get_mut().decode_fields(reader),
             Content::Null | Content::Descendant(_) => Ok(()),
         }
     }
@@ -98,14 +150,15 @@ impl<T: Struct> Value for Ref<T> {
         Self::NULL
     }
     fn decode(&mut self, reader: &mut Reader<'_>) -> Decoded<()> {
-        self.0 = Content::Null;
         if reader.skip(&T::TYPE.header) {
             return reader.nested(|reader| self.decode_exact(reader));
         }
-        if let Some(header) = reader.header()? {
-            let object = reader.nested(|reader| decode_descendant(header, T::TYPE, reader))?;
-            self.0 = Content::Descendant(object);
-        }
+        self.0 = match reader.header()? {
+            Some(header) => {
+                Content::Descendant(reader.nested(|reader| decode_descendant(header, T::TYPE, reader))?)
+            }
+            None => Content::Null,
+        };
         Ok(())
     }
     fn encode(&self, writer: &mut Writer<'_>) -> Encoded {
@@ -131,7 +184,7 @@ impl<T: Struct> Reference for Ref<T> {
             return Err(object);
         }
         self.0 = match object.downcast() {
-            Ok(exact) => Content::Exact(*exact),
+            Ok(exact) => Content::Exact(T::Place::from_box(exact)),
             Err(descendant) => Content::Descendant(descendant),
         };
         Ok(())
@@ -142,7 +195,7 @@ impl<T: Struct> Reference for Ref<T> {
 /// the model does not call optional.
 impl<T: Struct> Default for Ref<T> {
     fn default() -> Self {
-        Self(Content::Exact(T::default()))
+        Self(Content::Exact(T::Place::default()))
     }
 }
 

@@ -1,6 +1,5 @@
 //! The UXNATIVE series: the inner life of UxAS services and vehicles.
 
-use super::Ref;
 use super::cmasi::{
     AltitudeType, EntityConfiguration, EntityState, KeepInZone, KeepOutZone, Location3D, MissionCommand,
     OperatingRegion, Task, VehicleAction,
@@ -8,6 +7,7 @@ use super::cmasi::{
 use super::impact::{AreaOfInterest, LineOfInterest, PointOfInterest};
 use super::registry::table;
 use super::schema::{Series, SeriesName, TypeInfo};
+use super::{Ref, Text};
 
 /// The series as the wire and the XML form know it.
 pub const SERIES: Series = Series {
@@ -34,7 +34,7 @@ lmcp_types! {
     /// Has the service manager start a service, and tells it what is known.
     3 CreateNewService {
         service_id "ServiceID": i64,
-        xml_configuration "XmlConfiguration": String,
+        xml_configuration "XmlConfiguration": Text,
         entity_configurations "EntityConfigurations": Vec<Ref<EntityConfiguration>>,
         entity_states "EntityStates": Vec<Ref<EntityState>>,
         mission_commands "MissionCommands": Vec<Ref<MissionCommand>>,
@@ -82,7 +82,7 @@ lmcp_types! {
     /// A payload to measure a link with.
     8 BandwidthTest: EntityLocation {
         message_id "MessageID": i64,
-        payload "Payload": String,
+        payload "Payload": Text,
     }
 
     /// What arrived of a payload, and where from.
@@ -129,13 +129,13 @@ lmcp_types! {
     /// An entity joined the network.
     14 EntityJoin {
         entity_id "EntityID": i64,
-        label "Label": String,
+        label "Label": Text,
     }
 
     /// An entity left the network.
     15 EntityExit {
         entity_id "EntityID": i64,
-        label "Label": String,
+        label "Label": Text,
     }
 
     /// A vehicle is done with a step of simulated time.

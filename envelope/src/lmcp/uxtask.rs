@@ -1,9 +1,9 @@
 //! The UXTASK series: what tasks and the planner say to each other.
 
-use super::Ref;
 use super::cmasi::{AutomationRequest, AutomationResponse, Location3D, Task, WavelengthBand, Waypoint};
 use super::registry::table;
 use super::schema::{Series, SeriesName, TypeInfo};
+use super::{Ref, Text};
 
 /// The series as the wire and the XML form know it.
 pub const SERIES: Series =
@@ -148,7 +148,7 @@ lmcp_types! {
     /// Travel times between all options of all tasks, by vehicle.
     16 AssignmentCostMatrix {
         corresponding_automation_request_id "CorrespondingAutomationRequestID": i64,
-        task_level_relationship "TaskLevelRelationship": String,
+        task_level_relationship "TaskLevelRelationship": Text,
         task_list "TaskList": Vec<i64>,
         operating_region "OperatingRegion": i64,
         cost_matrix "CostMatrix": Vec<Ref<TaskOptionCost>>,
@@ -196,7 +196,7 @@ lmcp_types! {
     21 TaskPlanOptions {
         corresponding_automation_request_id "CorrespondingAutomationRequestID": i64,
         task_id "TaskID": i64,
-        composition "Composition": String,
+        composition "Composition": Text,
         options "Options": Vec<Ref<TaskOption>>,
     }
 

@@ -6,6 +6,15 @@ use super::reader::{Decoded, Reader};
 use super::schema::{EnumInfo, Kind};
 use super::writer::{Encoded, Writer};
 
+/// A text of an object. Up to 24 bytes stand in line, without a box: most keys, labels and names do.
+pub type Text = compact_str::CompactString;
+
+/// The longest text that stands in line.
+const TEXT_INLINE: usize = size_of::<Text>();
+
+/// What a longer text takes at least.
+const TEXT_APART_MIN: usize = TEXT_INLINE + size_of::<usize>();
+
 /// A value that a field may hold. Floating-point numbers keep their bits, enumerations any number.
 pub trait Value: Sized {
     /// What the schema says of it.
@@ -68,7 +77,7 @@ pub enum Slot<'a> {
     /// A number that stands for a name of the enumeration, if it is one of the declared.
     Enum(&'a mut i32, &'static EnumInfo),
     /// A text.
-    Text(&'a mut String),
+    Text(&'a mut Text),
     /// An object, or null.
     Object(&'a mut dyn Reference),
     /// Several values of one kind.
@@ -156,18 +165,20 @@ impl Value for bool {
     }
 }
 
-impl Value for String {
+impl Value for Text {
     const KIND: Kind = Kind::Text;
     fn blank() -> Self {
-        Self::new()
+        Self::const_new("")
     }
     #[inline]
     fn decode(&mut self, reader: &mut Reader<'_>) -> Decoded<()> {
         let length = reader.u16()?.into();
         let bytes = reader.bytes(length)?;
         let Ok(text) = str::from_utf8(bytes) else { return reader.fail_back(length, DecodeFault::Text) };
-        reader.allocate(length)?;
-        *self = text.to_owned();
+        if length > TEXT_INLINE {
+            reader.allocate(length.max(TEXT_APART_MIN))?;
+        }
+        *self = Text::new(text);
         Ok(())
     }
     #[inline]

@@ -15,7 +15,7 @@
 //! `null`, left out where null is the field's default. Blanks around a text are no part of it unless
 //! written as character references, and are written so. A NaN's other bits are lost.
 //!
-//! While a document is read, it takes several times its length in memory: it is meant for the files of
+//! While a document is read, it takes up to some thirty times its length in memory: it is meant for the files of
 //! users, whose length the caller bounds, not for bytes from a network.
 
 mod read;

@@ -3,6 +3,7 @@
 mod bus;
 mod child;
 mod join;
+mod lmcp;
 mod service_node;
 mod statistics;
 mod uxas;
@@ -13,7 +14,7 @@ use clap::Subcommand;
 /// Measure this machine: each figure beside a peer's or the limit's, turn about in the same run.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json\n  aldis bench join --instances 10000 --rate 1000 --json"
+    after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json\n  aldis bench lmcp --json\n  aldis bench join --instances 10000 --rate 1000 --json"
 )]
 pub(crate) struct Bench {
     #[command(subcommand)]
@@ -28,6 +29,8 @@ enum What {
     Uxas(uxas::UxasBench),
     /// A late joiner of many retained instances, while their writer keeps writing.
     Join(join::JoinBench),
+    /// LMCP messages read and written on one core.
+    Lmcp(lmcp::LmcpBench),
     /// The other process of `bench bus`.
     #[command(hide = true)]
     BusPeer(bus::BusPeer),
@@ -46,6 +49,7 @@ impl Bench {
             What::Uxas(bench) => bench.run(),
             What::Join(bench) => bench.run(),
             What::Joiner(joiner) => joiner.run(),
+            What::Lmcp(bench) => bench.run(),
             What::BusPeer(peer) => peer.run(),
             What::TcpCopy(copy) => copy.run(),
         }

@@ -101,7 +101,7 @@ fn answer(envelope: &Envelope, elapsed: Duration) -> Value {
         "round_trip_ms": (elapsed.as_secs_f64() * 1e6).round() / 1e3,
     });
     if message.label.descriptor() != aldis::PONG {
-        answer["content"] = content_text(&message.label, &message.content);
+        answer["content"] = content_text(&message.label, &message.content, true);
     }
     answer
 }

@@ -2,8 +2,8 @@
 
 use super::exit::Failure;
 use super::member::{Desk, Join, Member};
-use super::messages::envelope_json;
 use super::print_line;
+use super::subscribe::envelope_json;
 use super::within::Within;
 use aldis_envelope::{Change, ContentType, Envelope, Guid, Guids, Now, Prefix, umaa};
 use aldis_services::{Input, Outbox};
@@ -31,7 +31,7 @@ Examples:
   aldis command watch UMAA::SO::ResourceAllocation --for 1m --json")]
 struct Watch {
     /// Beginnings of topics.
-    #[arg(default_value = "UMAA::", value_parser = super::messages::prefix)]
+    #[arg(default_value = "UMAA::", value_parser = super::subscribe::prefix)]
     topics: Vec<Prefix>,
     /// End after so many lines.
     #[arg(long)]
@@ -136,7 +136,7 @@ impl Watch {
 
     fn print(&self, guids: &Guids, envelope: &Envelope) {
         if self.json {
-            print_line(envelope_json(envelope));
+            print_line(envelope_json(envelope, true));
             return;
         }
         let message = &envelope.message;

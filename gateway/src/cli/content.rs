@@ -1,7 +1,7 @@
 //! Contents on the command line: what goes in, and what comes out for people and machines.
 
 use super::exit::Failure;
-use aldis_envelope::{ContentType, Descriptor, Label, aldis, umaa};
+use aldis_envelope::{ContentType, Descriptor, Label, aldis, lmcp, umaa};
 use bytes::Bytes;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -16,16 +16,26 @@ pub(super) fn content_type(text: &str) -> Result<ContentType, String> {
     ContentType::new(text).map_err(|why| why.to_string())
 }
 
-/// A content for people and machines: read where its type is known, otherwise its bytes in hexadecimal.
-pub(super) fn content_text(label: &Label, content: &[u8]) -> Value {
+/// A content for people and machines: read where its type is known, LMCP where it is to be decoded, otherwise its bytes
+/// in hexadecimal.
+pub(super) fn content_text(label: &Label, content: &[u8], decode: bool) -> Value {
     let read = match (label.descriptor(), &label.attributes.content_type) {
         (aldis::NODE_STATUS, ContentType::Aldis) => {
             aldis::decode::<aldis::NodeStatus>(content).map(|s| status_text(&s))
         }
         (name, ContentType::Umaa) => umaa::topic(name).and_then(|topic| topic.json(content).ok()),
+        (_, ContentType::Lmcp) if decode && !content.is_empty() => return lmcp_text(content),
         _ => None,
     };
     read.unwrap_or_else(|| json!({ "bytes": content.len(), "hex": hex(content) }))
+}
+
+/// An LMCP message; one that cannot be decoded as its bytes, with what is wrong.
+fn lmcp_text(content: &[u8]) -> Value {
+    match lmcp::decode(content) {
+        Ok(object) => lmcp::to_json(object.as_ref()),
+        Err(why) => json!({ "bytes": content.len(), "hex": hex(content), "error": why.to_string() }),
+    }
 }
 
 /// A node's status for people and machines.

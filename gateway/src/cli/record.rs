@@ -30,7 +30,7 @@ pub(crate) struct Record {
     /// The file to write; it must not exist.
     file: PathBuf,
     /// Beginnings of addresses, or ids, matched whole. None: everything.
-    #[arg(value_parser = super::messages::prefix)]
+    #[arg(value_parser = super::subscribe::prefix)]
     prefixes: Vec<Prefix>,
     /// End after so many envelopes.
     #[arg(long)]

@@ -7,7 +7,7 @@ lmcp_types! {
     SERIES "afrl.cmasi";
 
     /// What every action of a vehicle is.
-    7 VehicleAction {
+    7 VehicleAction in Box {
         associated_task_list "AssociatedTaskList": Vec<i64>,
     }
 
@@ -65,7 +65,7 @@ lmcp_types! {
     }
 
     /// Keeps a vehicle near a place.
-    33 LoiterAction: NavigationAction {
+    33 LoiterAction: NavigationAction in Box {
         loiter_type "LoiterType": LoiterType,
         radius "Radius" ["m"]: f32,
         axis "Axis" ["deg"]: f32,

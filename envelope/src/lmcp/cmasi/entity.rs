@@ -4,17 +4,17 @@ use super::{
     AltitudeType, KeyValuePair, Location3D, LoiterType, NavigationMode, PayloadConfiguration, PayloadState,
     SERIES, TurnType,
 };
-use crate::lmcp::Ref;
+use crate::lmcp::{Ref, Text};
 
 lmcp_types! {
     SERIES "afrl.cmasi";
 
     /// What every entity is able to do and carries.
-    11 EntityConfiguration {
+    11 EntityConfiguration in Box {
         id "ID": i64,
-        affiliation "Affiliation": String = String::from("Unknown"),
-        entity_type "EntityType": String,
-        label "Label": String,
+        affiliation "Affiliation": Text = Text::const_new("Unknown"),
+        entity_type "EntityType": Text,
+        label "Label": Text,
         nominal_speed "NominalSpeed" ["m/s"]: f32,
         nominal_altitude "NominalAltitude" ["m"]: f32,
         nominal_altitude_type "NominalAltitudeType": AltitudeType,
@@ -24,7 +24,7 @@ lmcp_types! {
 
     /// A speed with what it costs to fly it.
     12 FlightProfile {
-        name "Name": String,
+        name "Name": Text,
         airspeed "Airspeed" ["m/s"]: f32,
         pitch_angle "PitchAngle" ["deg"]: f32,
         vertical_speed "VerticalSpeed" ["m/s"]: f32,

@@ -1,15 +1,15 @@
 //! Payloads and their states.
 
 use super::{FOVOperationMode, GimbalPointingMode, KeyValuePair, Location3D, SERIES, WavelengthBand};
-use crate::lmcp::Ref;
+use crate::lmcp::{Ref, Text};
 
 lmcp_types! {
     SERIES "afrl.cmasi";
 
     /// What every payload of an entity is.
-    5 PayloadConfiguration {
+    5 PayloadConfiguration in Box {
         payload_id "PayloadID": i64,
-        payload_kind "PayloadKind": String,
+        payload_kind "PayloadKind": Text,
         parameters "Parameters": Vec<Ref<KeyValuePair>>,
     }
 
@@ -48,7 +48,7 @@ lmcp_types! {
     }
 
     /// What every payload's state is.
-    6 PayloadState {
+    6 PayloadState in Box {
         payload_id "PayloadID": i64,
         parameters "Parameters": Vec<Ref<KeyValuePair>>,
     }

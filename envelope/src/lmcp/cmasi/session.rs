@@ -1,15 +1,15 @@
 //! What services, simulations and operators tell.
 
 use super::{SERIES, ServiceStatusType, SimulationStatusType};
-use crate::lmcp::Ref;
+use crate::lmcp::{Ref, Text};
 
 lmcp_types! {
     SERIES "afrl.cmasi";
 
     /// A named text, for what the model has no field for.
     2 KeyValuePair {
-        key "Key": String,
-        value "Value": String,
+        key "Key": Text,
+        value "Value": Text,
     }
 
     /// Something that an operator says.

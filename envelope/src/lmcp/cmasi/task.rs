@@ -4,15 +4,15 @@ use super::{
     AbstractGeometry, KeyValuePair, Location3D, LoiterAction, MissionCommand, SERIES, VehicleActionCommand,
     WavelengthBand, Wedge,
 };
-use crate::lmcp::Ref;
+use crate::lmcp::{Ref, Text};
 
 lmcp_types! {
     SERIES "afrl.cmasi";
 
     /// What every task is: something to be done by one or more of the eligible entities.
-    8 Task {
+    8 Task in Box {
         task_id "TaskID": i64,
-        label "Label": String,
+        label "Label": Text,
         eligible_entities "EligibleEntities": Vec<i64>,
         revisit_rate "RevisitRate" ["s"]: f32,
         parameters "Parameters": Vec<Ref<KeyValuePair>>,
@@ -67,7 +67,7 @@ lmcp_types! {
     40 AutomationRequest {
         entity_list "EntityList": Vec<i64>,
         task_list "TaskList": Vec<i64>,
-        task_relationships "TaskRelationships": String,
+        task_relationships "TaskRelationships": Text,
         operating_region "OperatingRegion": i64,
         redo_all_tasks "RedoAllTasks": bool,
     }

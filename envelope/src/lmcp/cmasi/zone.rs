@@ -1,7 +1,7 @@
 //! Zones, regions and the weather in them.
 
 use super::{AbstractGeometry, AltitudeType, SERIES, ZoneAvoidanceType};
-use crate::lmcp::Ref;
+use crate::lmcp::{Ref, Text};
 
 lmcp_types! {
     SERIES "afrl.cmasi";
@@ -17,7 +17,7 @@ lmcp_types! {
         start_time "StartTime" ["ms"]: i64,
         end_time "EndTime" ["ms"]: i64,
         padding "Padding" ["m"]: f32,
-        label "Label": String,
+        label "Label": Text,
         boundary "Boundary": Ref<AbstractGeometry>,
     }
 

@@ -8,7 +8,7 @@ use crate::lmcp::error::{FieldPath, Within};
 use crate::lmcp::object::Object;
 use crate::lmcp::registry::type_of;
 use crate::lmcp::schema::EnumInfo;
-use crate::lmcp::value::{List, Reference, Slot};
+use crate::lmcp::value::{List, Reference, Slot, Text};
 
 /// Why JSON is not the form of an object.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -116,7 +116,7 @@ fn read_value(json: &Json, slot: Slot<'_>) -> Read<()> {
         Slot::Real32(value) => set(value, real(json).and_then(narrow), "a 32-bit number"),
         Slot::Real64(value) => set(value, real(json), "a number"),
         Slot::Enum(value, info) => set(value, enumeration(json, info), "a number or name of the enumeration"),
-        Slot::Text(value) => set(value, json.as_str().map(str::to_owned), "a text"),
+        Slot::Text(value) => set(value, json.as_str().map(Text::new), "a text"),
         Slot::Object(reference) => read_reference(json, reference),
         Slot::List(list) => read_list(json, list),
     }

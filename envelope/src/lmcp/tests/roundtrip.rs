@@ -55,7 +55,7 @@ impl Dice {
             Slot::Real32(value) => *value = self.real() as f32,
             Slot::Real64(value) => *value = self.real(),
             Slot::Enum(value, _) => *value = self.roll() as i32 >> self.below(32),
-            Slot::Text(value) => *value = self.text(),
+            Slot::Text(value) => *value = self.text().into(),
             Slot::Object(reference) => match kind {
                 Kind::Object(declared) if depth > 0 && self.below(4) > 0 => {
                     assert!(reference.put(self.object(declared, depth - 1)).is_ok());

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::{files, golden_messages, read, shared};
 use crate::lmcp::cmasi::{AirVehicleState, AltitudeType, AutomationRequest, KeyValuePair, Location3D};
 use crate::lmcp::impact::CommRelayTask;
-use crate::lmcp::{Object, Ref, WarningKind, XmlFault, decode, encode, read_xml, to_xml};
+use crate::lmcp::{Object, Ref, Text, WarningKind, XmlFault, decode, encode, read_xml, to_xml};
 
 /// The one object of a document without anything to warn of.
 fn read_one(xml: &str) -> Box<dyn Object> {
@@ -141,7 +141,7 @@ fn texts_come_back_with_blanks_and_markup() {
         let pair = KeyValuePair { key: text.into(), value: "v".into() };
         assert_eq!(read_one(&to_xml(&pair).unwrap()).get(), Some(&pair), "{text:?}");
     }
-    let pair = KeyValuePair { key: "a\0".into(), value: String::new() };
+    let pair = KeyValuePair { key: "a\0".into(), value: Text::default() };
     assert_eq!(to_xml(&pair).unwrap_err().to_string(), "XML cannot hold '\\0' in Key");
 }
 

@@ -240,7 +240,7 @@ impl Document {
             Slot::Real32(value) => set(value, text.parse().ok()),
             Slot::Real64(value) => set(value, text.parse().ok()),
             Slot::Enum(value, info) => set(value, enumeration(text, info)),
-            Slot::Text(value) => set(value, Some(text.to_owned())),
+            Slot::Text(value) => set(value, Some(text.into())),
             Slot::Object(_) | Slot::List(_) => false,
         };
         if !read {

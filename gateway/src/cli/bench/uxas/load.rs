@@ -67,7 +67,7 @@ impl Frames {
 fn state() -> Result<Vec<u8>, Failure> {
     let with_info = |length: usize| {
         let location = cmasi::Location3D { latitude: 45.3, longitude: -120.9, ..Default::default() };
-        let fill = cmasi::KeyValuePair { key: "fill".into(), value: "x".repeat(length) };
+        let fill = cmasi::KeyValuePair { key: "fill".into(), value: "x".repeat(length).into() };
         let base = cmasi::EntityState {
             id: 400,
             location: Ref::new(location),
