@@ -17,7 +17,7 @@ const LAYERS: [&[&str]; 7] = [
     &["service"],
     &["allow", "calls", "counters", "event", "map", "notes", "streams", "umaa"],
     &["bridge", "labels"],
-    &["health", "log", "track"],
+    &["conform", "health", "log", "track"],
     &["host", "registry"],
     &["node"],
     &["sim"],
