@@ -56,6 +56,10 @@ impl Default for Bounds {
     }
 }
 
+/// How much is followed at a time, of instances, commands and elements each: what is beyond is counted in
+/// [`Report::unfollowed`], and not judged. A fleet of 100 vehicles is far below it.
+const FOLLOWED_MAX: usize = 100_000;
+
 /// Which instance an observation is of.
 type InstanceId = (String, KeyHash);
 
@@ -101,7 +105,11 @@ impl Monitor {
             Observed::Put(Content::Sample(value)) => {
                 let sample = Sample::new(value.clone());
                 schema::check_sample(observation, &sample, &mut self.ledger);
-                self.keys.insert(id.clone(), sample.clone());
+                if self.keys.len() < FOLLOWED_MAX || self.keys.contains_key(&id) {
+                    self.keys.insert(id.clone(), sample.key());
+                } else {
+                    self.ledger.unfollowed();
+                }
                 self.put(observation, &id, &sample);
             }
             Observed::Put(Content::Unreadable(why)) => {
@@ -132,7 +140,9 @@ impl Monitor {
         } else if collection::is_element(topic) {
             self.collections.element(sample, *retained, ledger);
         } else {
-            self.reports.insert(id.clone());
+            if self.reports.len() < FOLLOWED_MAX {
+                self.reports.insert(id.clone());
+            }
             self.collections.report(sample, *retained, ledger);
             self.allocations.report(topic, sample, ledger);
         }

@@ -13,6 +13,9 @@ const SERVICE: &str = "UMAA::SO::ResourceAllocation::";
 const ALLOCATION: &str = "UMAA::SO::ResourceAllocation::ResourceAllocation";
 const PRIORITY: &str = "UMAA::SO::ResourceAllocation::ResourceAllocationPriority";
 
+/// How many services that allocate are followed: a vehicle has one.
+const ARBITERS_MAX: usize = 1000;
+
 /// A consumer in control by an allocation command that is executed.
 #[derive(Debug, Clone, Copy)]
 struct Holder {
@@ -62,6 +65,10 @@ impl Allocations {
         ledger.judge(Clause::ResourceOnce, different.len() == resources.len(), || {
             format!("{} resources in {} entries", different.len(), resources.len())
         });
+        if self.arbiters.len() >= ARBITERS_MAX && !self.arbiters.contains_key(&source) {
+            ledger.unfollowed();
+            return;
+        }
         let entries = resources.into_iter().zip(entries);
         let arbiter = self.arbiters.entry(source).or_default();
         match name {

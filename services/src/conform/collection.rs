@@ -1,8 +1,8 @@
 //! Large Sets and Large Lists (ICD 3.8) as they can be judged from outside: what metadata says against what comes.
 
-use super::Clause;
 use super::ledger::{Debt, Ledger};
 use super::sample::{Sample, time};
+use super::{Clause, FOLLOWED_MAX};
 use aldis_envelope::Guid;
 use serde_json::Value;
 use std::collections::{BTreeMap, VecDeque};
@@ -74,6 +74,10 @@ impl Collections {
     pub(super) fn element(&mut self, sample: &Sample, retained: bool, ledger: &mut Ledger) {
         let collection = sample.guid("setID").or_else(|| sample.guid("listID"));
         let (Some(collection), Some(element)) = (collection, sample.guid("elementID")) else { return };
+        if self.owners.len() >= FOLLOWED_MAX && !self.owners.contains_key(&element) {
+            ledger.unfollowed();
+            return;
+        }
         let owner = *self.owners.entry(element).or_insert(collection);
         ledger.judge(Clause::ElementId, owner == collection, || {
             format!("element {element} of {collection} is one of {owner} too")
@@ -106,6 +110,10 @@ impl Collections {
             ledger.judge(Clause::EmptyCollection, sound, || {
                 format!("{} names the nil element with {} elements", metadata.collection, metadata.size)
             });
+            if self.known.len() >= FOLLOWED_MAX && !self.known.contains_key(&metadata.collection) {
+                ledger.unfollowed();
+                continue;
+            }
             let known = self.known.entry(metadata.collection).or_default();
             known.partial |= retained;
             if sound {

@@ -2,9 +2,9 @@
 
 mod session;
 
-use super::Clause;
 use super::ledger::Ledger;
 use super::sample::Sample;
+use super::{Clause, FOLLOWED_MAX};
 use aldis_envelope::Guid;
 use session::Session;
 use std::collections::{BTreeMap, BTreeSet};
@@ -83,6 +83,10 @@ impl Commands {
             return None;
         }
         let id = (part.family.clone(), session_id, provider);
+        if self.sessions.len() >= FOLLOWED_MAX && !self.sessions.contains_key(&id) {
+            ledger.unfollowed();
+            return None;
+        }
         let has_execution_status =
             self.execution_statuses.contains(&format!("{}ExecutionStatusReport", part.family));
         let new = || Session::new(id.clone(), has_execution_status);

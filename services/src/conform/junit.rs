@@ -59,7 +59,7 @@ mod tests {
         let first = Some(Evidence { at: Monotonic::START, topic: "UMAA::SO::A::B".to_owned(), text });
         let broken = ClauseReport { clause: Clause::Range, held: 1, broken: 2, first };
         let unseen = ClauseReport { clause: Clause::Key, held: 0, broken: 0, first: None };
-        let xml = render(&Report { observations: 3, open: 0, clauses: vec![broken, unseen] });
+        let xml = render(&Report { observations: 3, open: 0, unfollowed: 0, clauses: vec![broken, unseen] });
         assert!(xml.contains("tests=\"2\" failures=\"1\" errors=\"0\" skipped=\"1\""), "{xml}");
         assert!(xml.contains("UMAA::SO::A::B: &quot;&lt;a&gt;&amp;? </failure>"), "{xml}");
         assert!(xml.contains("name=\"key\"><skipped/>"), "{xml}");

@@ -1,13 +1,10 @@
 //! What was held and what was broken, and what is still owed.
 
 use super::report::{ClauseReport, Report};
-use super::{Bounds, Clause};
+use super::{Bounds, Clause, FOLLOWED_MAX};
 use aldis_envelope::{Guid, Monotonic};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
-
-/// How many things may be owed at a time. Beyond it new ones are not followed.
-const OWED_MAX: usize = 100_000;
 
 /// The first sight of a breach.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -45,6 +42,7 @@ pub(super) struct Ledger {
     owed: BTreeMap<Debt, Owed>,
     /// The same by their dates.
     dues: BTreeSet<(Monotonic, Debt)>,
+    unfollowed: u64,
     now: Monotonic,
     topic: String,
 }
@@ -52,7 +50,8 @@ pub(super) struct Ledger {
 impl Ledger {
     pub(super) fn new(bounds: Bounds) -> Self {
         let (counts, owed, dues) = (BTreeMap::new(), BTreeMap::new(), BTreeSet::new());
-        Self { bounds, counts, owed, dues, now: Monotonic::START, topic: String::new() }
+        let (now, topic) = (Monotonic::START, String::new());
+        Self { bounds, counts, owed, dues, unfollowed: 0, now, topic }
     }
 
     /// Time goes on to the observation on a topic: what was owed before it is broken.
@@ -67,6 +66,11 @@ impl Ledger {
             count.first.get_or_insert(Evidence { at, topic, text });
         }
         self.topic.replace_range(.., topic);
+    }
+
+    /// There is too much to follow this too.
+    pub(super) fn unfollowed(&mut self) {
+        self.unfollowed += 1;
     }
 
     pub(super) fn held(&mut self, clause: Clause) {
@@ -86,7 +90,9 @@ impl Ledger {
 
     /// Something is owed from now on, within so long. What is owed already stays owed by its first date.
     pub(super) fn owe(&mut self, debt: Debt, within: Duration, text: String) {
-        if self.owed.len() < OWED_MAX && !self.owed.contains_key(&debt) {
+        if self.owed.len() >= FOLLOWED_MAX {
+            self.unfollowed += 1;
+        } else if !self.owed.contains_key(&debt) {
             let (due, topic) = (self.now + within, self.topic.clone());
             self.dues.insert((due, debt.clone()));
             self.owed.insert(debt, Owed { due, topic, text });
@@ -119,6 +125,6 @@ impl Ledger {
             ClauseReport { clause: *clause, held, broken, first }
         };
         let clauses = Clause::ALL.iter().map(clause).collect();
-        Report { observations, open: self.owed.len(), clauses }
+        Report { observations, open: self.owed.len(), unfollowed: self.unfollowed, clauses }
     }
 }

@@ -57,6 +57,8 @@ pub struct Report {
     pub observations: u64,
     /// How much was owed at the end and not yet due.
     pub open: usize,
+    /// How often something was left unjudged because too much was going on.
+    pub unfollowed: u64,
     /// Every clause, in the order of the ICD.
     pub clauses: Vec<ClauseReport>,
 }
@@ -84,7 +86,7 @@ impl Report {
             })
         };
         json!({
-            "observations": self.observations, "open": self.open,
+            "observations": self.observations, "open": self.open, "unfollowed": self.unfollowed,
             "clauses_held": self.count(Verdict::Held), "clauses_broken": self.count(Verdict::Broken),
             "clauses_not_seen": self.count(Verdict::NotSeen),
             "clauses": self.clauses.iter().map(clause).collect::<Vec<_>>(),

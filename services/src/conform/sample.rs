@@ -3,6 +3,9 @@
 use aldis_envelope::Guid;
 use serde_json::Value;
 
+/// All members that are keys in some topic.
+const KEY_MEMBERS: [&str; 5] = ["source", "sessionID", "destination", "resourceID", "elementID"];
+
 /// A sample, or the key of one.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Sample(Value);
@@ -38,10 +41,16 @@ impl Sample {
         self.0[member].as_array().into_iter().flatten().filter_map(guid).collect()
     }
 
+    /// Those of its members that may be its key.
+    pub(super) fn key(&self) -> Self {
+        let members =
+            KEY_MEMBERS.iter().filter_map(|name| Some(((*name).to_owned(), self.0.get(*name)?.clone())));
+        Self(Value::Object(members.collect()))
+    }
+
     /// Who it is of, for people.
     pub(super) fn key_text(&self) -> String {
-        let members = ["source", "sessionID", "destination", "resourceID", "elementID"];
-        let told = members.iter().filter_map(|name| Some(format!("{name} {}", self.text(name)?)));
+        let told = KEY_MEMBERS.iter().filter_map(|name| Some(format!("{name} {}", self.text(name)?)));
         told.collect::<Vec<_>>().join(", ")
     }
 }
