@@ -5,6 +5,7 @@ mod bench;
 mod call;
 mod check;
 mod command;
+mod conform;
 mod content;
 mod demo;
 mod exit;
@@ -74,6 +75,8 @@ enum Command {
     Priority(allocation::Priority),
     /// Follow UMAA commands.
     Command(command::CommandArgs),
+    /// Watch UMAA traffic and report what of the ICD was held and broken.
+    Conform(conform::Conform),
     /// Record envelopes into a file.
     Record(record::Record),
     /// Send a recording again.
@@ -105,6 +108,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Release(args) => args.run(),
         Command::Priority(args) => args.run(),
         Command::Command(args) => args.run(),
+        Command::Conform(args) => args.run(),
         Command::Record(args) => args.run(),
         Command::Replay(args) => args.run(),
         Command::Health(args) => args.run(),

@@ -6,6 +6,7 @@
 pub mod allow;
 pub mod bridge;
 pub mod calls;
+pub mod conform;
 pub mod counters;
 pub mod dds;
 pub mod event;

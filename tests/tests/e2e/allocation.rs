@@ -64,6 +64,7 @@ fn a_higher_priority_takes_over_and_a_lower_one_does_not() {
     let site = Site::new();
     let _nodes = start(&site);
     thread::scope(|scope| {
+        let watching = scope.spawn(|| site.aldis(&["conform", "--for", "25s", "--json"]));
         let lower = scope.spawn(|| site.aldis(&["allocate", "400:autopilot", "--json"]));
         wait_for_holder(&site, "eid9000sid100");
         let higher = scope
@@ -81,6 +82,11 @@ fn a_higher_priority_takes_over_and_a_lower_one_does_not() {
         let released = site.aldis(&["release", "--as", "9001"]);
         assert_eq!(released.code, Some(0), "{released:?}");
         assert_eq!(way(&higher.join().unwrap()), "ISSUED COMMANDED EXECUTING - CANCELED");
+        let watched = watching.join().unwrap();
+        assert_eq!(watched.code, Some(0), "{watched:?}");
+        let report = &watched.json()[0];
+        assert!(report["observations"].as_u64().unwrap() > 20, "{report}");
+        assert!(report["clauses_held"].as_u64().unwrap() > 10, "{report}");
     });
     assert_eq!(holder(&site), Value::Null);
 }

@@ -1,0 +1,204 @@
+//! `aldis conform`: watches a bus, or a recording, and says clause by clause what of the ICD held.
+
+use super::exit::Failure;
+use super::member::{Desk, Join, Member};
+use super::print_line;
+use super::within::Within;
+use aldis_envelope::codec::recording::Reader;
+use aldis_envelope::{Envelope, KeyHash, Monotonic, Now, Prefix, Source};
+use aldis_services::conform::{Bounds, Decoder, Monitor, Observation, Observed, Report, Verdict};
+use aldis_services::{Input, Outbox};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::time::{Duration, Instant};
+
+/// How many instances are remembered with their writers, to tell when those have vanished.
+const INSTANCES_MAX: usize = 100_000;
+
+/// Watch UMAA traffic and report, clause by clause of the ICD, what was held and what was broken.
+///
+/// Exit code 1 where a clause was broken.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  aldis conform --for 5m                      a running fleet, for five minutes
+  aldis conform                               until it is stopped
+  aldis conform --file watch.aldis --format junit > conform.xml")]
+pub(crate) struct Conform {
+    /// A recording of `aldis record` in place of a running fleet.
+    #[arg(long)]
+    file: Option<PathBuf>,
+    /// Watch for so long. Default: until it is stopped.
+    #[arg(long = "for", conflicts_with = "file")]
+    span: Option<Within>,
+    /// How the report is written.
+    #[arg(long, default_value = "text")]
+    format: Format,
+    /// One JSON object, as `--format json`.
+    #[arg(long, conflicts_with = "format")]
+    json: bool,
+    /// How much later what one writer says may come beside what another says.
+    #[arg(long, default_value = "500ms")]
+    slack: Within,
+    #[command(flatten)]
+    join: Join,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Format {
+    /// For people.
+    Text,
+    /// One JSON object.
+    Json,
+    /// JUnit XML: a test case a clause.
+    Junit,
+}
+
+/// Hands what the bus says to the monitor.
+struct Watching {
+    monitor: Arc<Mutex<Option<Monitor>>>,
+    decoder: Decoder,
+    has_history: bool,
+    written: BTreeMap<Source, BTreeSet<(String, KeyHash)>>,
+    instances: usize,
+    tell: mpsc::Sender<Told>,
+}
+
+/// What the desk and the signals tell the command.
+enum Told {
+    Joined,
+    Stop,
+}
+
+impl Watching {
+    fn observe(&self, observation: &Observation) {
+        let mut monitor = self.monitor.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(monitor) = monitor.as_mut() {
+            monitor.observe(observation);
+        }
+    }
+
+    fn message(&mut self, now: Now, envelope: &Envelope) {
+        let Some(observation) = self.decoder.observation(now.monotonic, envelope) else { return };
+        let observation = Observation { retained: !self.has_history, ..observation };
+        let of_writer = self.written.entry(observation.writer).or_default();
+        let id = (observation.topic.clone(), observation.instance);
+        match observation.observed {
+            Observed::Put(_) if self.instances < INSTANCES_MAX && of_writer.insert(id.clone()) => {
+                self.instances += 1
+            }
+            Observed::Dispose | Observed::Unregister if of_writer.remove(&id) => self.instances -= 1,
+            _ => {}
+        }
+        self.observe(&observation);
+    }
+
+    /// A writer has vanished: nobody speaks for what it wrote.
+    fn vanished(&mut self, now: Now, writer: Source) {
+        let written = self.written.remove(&writer).unwrap_or_default();
+        self.instances -= written.len();
+        for (topic, instance) in written {
+            let observed = Observed::NoWriters;
+            self.observe(&Observation {
+                at: now.monotonic,
+                writer,
+                topic,
+                type_name: None,
+                instance,
+                key: None,
+                retained: false,
+                observed,
+            });
+        }
+    }
+}
+
+impl Desk for Watching {
+    fn take(&mut self, now: Now, input: Input<'_>, _: &mut Outbox) {
+        match input {
+            Input::Bus(true) => {
+                // The command no longer listens where it has been cut off.
+                let _ = self.tell.send(Told::Joined);
+            }
+            Input::HistoryComplete(_) => self.has_history = true,
+            Input::Message(envelope) if envelope.message.call.is_none() => self.message(now, envelope),
+            Input::Token(writer, false) => self.vanished(now, writer),
+            _ => {}
+        }
+    }
+}
+
+impl Conform {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let monitor = Monitor::new(Bounds { slack: self.slack.0, ..Bounds::default() }, []);
+        let report = match &self.file {
+            Some(file) => replayed(file, monitor)?,
+            None => self.watch(monitor)?,
+        };
+        match (self.json, self.format) {
+            (true, _) | (_, Format::Json) => print_line(report.json()),
+            (_, Format::Junit) => print_line(report.junit()),
+            (_, Format::Text) => print_line(report.to_string().trim_end()),
+        }
+        match report.count(Verdict::Broken) {
+            0 => Ok(()),
+            broken => Err(Failure::Failed(format!("{broken} clauses were broken"))),
+        }
+    }
+
+    fn watch(&self, monitor: Monitor) -> Result<Report, Failure> {
+        let (tell, told) = mpsc::channel();
+        let shared = Arc::new(Mutex::new(Some(monitor)));
+        let desk = Watching {
+            monitor: shared.clone(),
+            decoder: Decoder::new([]),
+            has_history: false,
+            written: BTreeMap::new(),
+            instances: 0,
+            tell: tell.clone(),
+        };
+        let prefixes = Prefix::new("UMAA::").into_iter().collect();
+        let member = Member::join(&self.join, prefixes, desk)?;
+        let joined = told.recv_timeout(super::JOIN_WITHIN);
+        let started = Instant::now();
+        if joined.is_ok() {
+            super::run::watch_signals(move || {
+                let _ = tell.send(Told::Stop);
+            })?;
+            let wait = self.span.map_or(Duration::MAX, |span| span.0);
+            // A session that comes back ends nothing.
+            while let Ok(Told::Joined) = told.recv_timeout(wait.saturating_sub(started.elapsed())) {}
+        }
+        member.leave()?;
+        joined.map_err(|_| self.join.unreachable())?;
+        let monitor = shared.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let monitor = monitor.ok_or_else(|| Failure::Failed("the monitor is gone".into()))?;
+        Ok(monitor.finish(Monotonic::since_start(started.elapsed())))
+    }
+}
+
+/// What a recording shows. Its first envelopes may be history: the recording does not say which.
+fn replayed(file: &std::path::Path, mut monitor: Monitor) -> Result<Report, Failure> {
+    let bytes = super::content::read_file(file)?;
+    let wrong = |why: &dyn std::fmt::Display| Failure::Usage(format!("{}: {why}", file.display()));
+    let reader = Reader::new(&bytes).map_err(|why| wrong(&why))?;
+    let decoder = Decoder::new([]);
+    let (mut first, mut last) = (None, Monotonic::START);
+    for record in reader {
+        let (received, envelope) = match record {
+            Ok(record) => record,
+            Err(why) => {
+                eprintln!("aldis: {}: {why}", file.display());
+                continue;
+            }
+        };
+        let start = *first.get_or_insert(received.0);
+        let elapsed = u64::try_from(received.0.saturating_sub(start)).unwrap_or_default();
+        last = Monotonic::since_start(Duration::from_nanos(elapsed)).max(last);
+        if let Some(observation) = decoder.observation(last, &envelope) {
+            monitor.observe(&observation);
+        }
+    }
+    Ok(monitor.finish(last))
+}

@@ -1,0 +1,321 @@
+//! One command from its first sign to its last.
+
+use super::{Role, SessionId, Step};
+use crate::conform::Clause;
+use crate::conform::ledger::{Debt, Ledger};
+use crate::conform::sample::Sample;
+use crate::conform::transition::{is_legal, is_reason, is_terminal};
+use aldis_envelope::Guid;
+
+/// What is known of a command.
+#[derive(Debug)]
+pub(super) struct Session {
+    id: SessionId,
+    /// Whether an execution status is defined for the command.
+    has_execution_status: bool,
+    command: Option<Sample>,
+    /// The command before its latest update: an acknowledgement may have crossed it.
+    before: Option<Sample>,
+    /// The consumer has disposed the command.
+    disposed: bool,
+    /// An update is on the bus that has not been answered.
+    updated: bool,
+    state: Option<String>,
+    last_status: Option<Sample>,
+    acknowledged: bool,
+    status_there: bool,
+    ack_there: bool,
+    execution_status_there: bool,
+}
+
+impl Session {
+    pub(super) fn new(id: SessionId, has_execution_status: bool) -> Self {
+        Self {
+            id,
+            has_execution_status,
+            command: None,
+            before: None,
+            disposed: false,
+            updated: false,
+            state: None,
+            last_status: None,
+            acknowledged: false,
+            status_there: false,
+            ack_there: false,
+            execution_status_there: false,
+        }
+    }
+
+    /// The consumer of the command, as long as the command is on the bus.
+    pub(super) fn active_source(&self) -> Option<Guid> {
+        self.command.as_ref().filter(|_| !self.disposed)?.guid("source")
+    }
+
+    /// Whether nothing of it is left on the bus.
+    pub(super) fn is_over(&self) -> bool {
+        let said = self.status_there || self.ack_there || self.execution_status_there;
+        !said && (self.command.is_none() || self.disposed && self.state.as_deref().is_none_or(is_terminal))
+    }
+
+    fn is_terminal(&self) -> bool {
+        self.state.as_deref().is_some_and(is_terminal)
+    }
+
+    fn debt(&self, clause: Clause) -> Debt {
+        let (family, session, provider) = &self.id;
+        (clause, family.clone(), *provider, *session)
+    }
+
+    fn owe(&self, clause: Clause, ledger: &mut Ledger, text: &str) {
+        let bounds = ledger.bounds;
+        let within = match clause {
+            Clause::ConsumerCleanUp | Clause::ProviderCleanUp => bounds.clean_up,
+            Clause::ExecutionStatus => bounds.follow,
+            Clause::Correlated | Clause::CleanUpOrder | Clause::CancelAsked => bounds.slack,
+            _ => bounds.answer,
+        };
+        ledger.owe(self.debt(clause), within, format!("session {}: {text}", self.id.1));
+    }
+
+    fn judge(&self, clause: Clause, held: bool, ledger: &mut Ledger, text: impl FnOnce() -> String) {
+        ledger.judge(clause, held, || format!("session {}: {}", self.id.1, text()));
+    }
+
+    /// The command is put: a new one, an update, or the same again.
+    pub(super) fn command(&mut self, sample: &Sample, retained: bool, ledger: &mut Ledger) {
+        ledger.pay(&self.debt(Clause::Correlated));
+        let Some(known) = self.command.clone().filter(|_| !self.disposed) else {
+            self.begin(sample, retained, ledger);
+            return;
+        };
+        if known == *sample {
+            return;
+        }
+        let newer = sample.time("timeStamp") > known.time("timeStamp");
+        self.judge(Clause::UpdateNewer, newer, ledger, || "changed without a newer timestamp".to_owned());
+        if !newer {
+            return;
+        }
+        let (in_time, state) = (!self.is_terminal(), self.state.clone().unwrap_or_default());
+        self.judge(Clause::UpdateInTime, in_time, ledger, || format!("updated when it was {state}"));
+        self.before = self.command.replace(sample.clone());
+        if in_time {
+            (self.updated, self.acknowledged) = (true, false);
+            self.owe(Clause::UpdateAnswered, ledger, "its update is not answered");
+        }
+    }
+
+    /// A command that was not there before, or one that reuses the session of another.
+    fn begin(&mut self, sample: &Sample, retained: bool, ledger: &mut Ledger) {
+        let reused = self.disposed;
+        self.command = Some(sample.clone());
+        (self.before, self.disposed, self.updated) = (None, false, false);
+        if reused {
+            (self.state, self.acknowledged) = (None, false);
+            for clause in [Clause::ProviderCleanUp, Clause::CancelAnswered] {
+                ledger.forgive(&self.debt(clause));
+            }
+        }
+        if self.state.is_none() && !retained {
+            self.owe(Clause::Answered, ledger, "its command is not answered");
+        }
+    }
+
+    /// An acknowledgement.
+    pub(super) fn ack(&mut self, sample: &Sample, retained: bool, ledger: &mut Ledger) {
+        self.ack_there = true;
+        self.correlate(retained, "an acknowledgement", ledger);
+        let acknowledged = Sample::new(sample.value()["command"].clone());
+        let is_now = self.command.as_ref() == Some(&acknowledged);
+        self.acknowledged |= is_now || retained;
+        if self.command.is_some() {
+            let matches = is_now || self.before.as_ref() == Some(&acknowledged);
+            self.judge(Clause::AckMatches, matches, ledger, || {
+                format!("it acknowledges {}", acknowledged.value())
+            });
+        }
+    }
+
+    /// An execution status.
+    pub(super) fn execution_status(&mut self, retained: bool, ledger: &mut Ledger) {
+        self.execution_status_there = true;
+        self.correlate(retained, "an execution status", ledger);
+        if retained {
+            return;
+        }
+        let executing = self.state.as_deref() == Some("EXECUTING") || self.updated;
+        let state = self.state.clone().unwrap_or_else(|| "not answered".to_owned());
+        if executing {
+            ledger.pay(&self.debt(Clause::ExecutionStatus));
+        }
+        self.judge(Clause::ExecutionStatus, executing, ledger, || {
+            format!("an execution status while {state}")
+        });
+    }
+
+    fn correlate(&self, retained: bool, what: &str, ledger: &mut Ledger) {
+        if self.command.is_some() {
+            ledger.held(Clause::Correlated);
+        } else if !retained {
+            self.owe(Clause::Correlated, ledger, &format!("{what} without a command"));
+        }
+    }
+
+    /// A status.
+    pub(super) fn status(&mut self, sample: &Sample, retained: bool, ledger: &mut Ledger) -> Option<Step> {
+        let (to, reason) =
+            (sample.text("commandStatus")?.to_owned(), sample.text("commandStatusReason")?.to_owned());
+        // The same sample again, after a restart of who carries it, is no new status.
+        if self.last_status.as_ref() == Some(sample) && self.status_there {
+            return None;
+        }
+        self.last_status = Some(sample.clone());
+        self.status_there = true;
+        self.correlate(retained, "a status", ledger);
+        if !retained {
+            self.transition(&to, &reason, ledger);
+        }
+        self.state = Some(to.clone());
+        self.after(&to, retained, ledger);
+        let (family, session, provider) = self.id.clone();
+        Some(Step { family, provider, session, command: self.command.clone(), to, reason })
+    }
+
+    fn transition(&self, to: &str, reason: &str, ledger: &mut Ledger) {
+        let from = self.state.as_deref();
+        if from.is_none() {
+            self.judge(Clause::FirstStatus, to == "ISSUED", ledger, || format!("its first status is {to}"));
+        }
+        let legal = is_legal(from, to);
+        if from.is_some() {
+            self.judge(Clause::Transition, legal, ledger, || {
+                format!("from {} to {to}", from.unwrap_or_default())
+            });
+        }
+        if legal {
+            self.judge(Clause::Reason, is_reason(from, to, reason), ledger, || {
+                format!("from {} to {to} for the reason {reason}", from.unwrap_or("the start"))
+            });
+        }
+        if legal && from.is_some() && to == "ISSUED" {
+            self.judge(Clause::UpdatedOnly, self.updated, ledger, || {
+                "back to ISSUED without an update".to_owned()
+            });
+        }
+        if to == "COMMANDED" && legal && !self.updated {
+            self.judge(Clause::AckFirst, self.acknowledged, ledger, || {
+                "COMMANDED before it is acknowledged".to_owned()
+            });
+        }
+        if to == "CANCELED" {
+            if self.disposed {
+                ledger.held(Clause::CancelAsked);
+            } else {
+                self.owe(Clause::CancelAsked, ledger, "CANCELED, but its command was not disposed");
+            }
+        }
+    }
+
+    /// What the new state pays, and what it brings about.
+    fn after(&mut self, to: &str, retained: bool, ledger: &mut Ledger) {
+        ledger.pay(&self.debt(Clause::Answered));
+        if to == "ISSUED" || is_terminal(to) {
+            ledger.pay(&self.debt(Clause::UpdateAnswered));
+            self.updated = false;
+        }
+        if to == "EXECUTING" && self.has_execution_status && !retained {
+            self.owe(Clause::ExecutionStatus, ledger, "no execution status while EXECUTING");
+        }
+        if !is_terminal(to) {
+            return;
+        }
+        ledger.forgive(&self.debt(Clause::ExecutionStatus));
+        if self.disposed {
+            ledger.pay(&self.debt(Clause::CancelAnswered));
+            self.owe(Clause::ProviderCleanUp, ledger, "what was said of it is not disposed");
+        } else if to != "CANCELED" && self.command.is_some() {
+            self.owe(
+                Clause::ConsumerCleanUp,
+                ledger,
+                &format!("it is {to}, and its command is not disposed"),
+            );
+        }
+    }
+
+    /// An instance is disposed.
+    pub(super) fn disposed(&mut self, role: Role, ledger: &mut Ledger) {
+        if role == Role::Command {
+            self.command_disposed(ledger);
+            return;
+        }
+        match role {
+            Role::Ack => self.ack_there = false,
+            Role::ExecutionStatus => self.execution_status_there = false,
+            _ => self.status_there = false,
+        }
+        if self.command.is_some() && !self.disposed {
+            self.owe(Clause::CleanUpOrder, ledger, "what was said of it is disposed before its command");
+        } else {
+            ledger.held(Clause::CleanUpOrder);
+        }
+        if !self.status_there && !self.ack_there && !self.execution_status_there {
+            ledger.pay(&self.debt(Clause::ProviderCleanUp));
+        }
+    }
+
+    fn command_disposed(&mut self, ledger: &mut Ledger) {
+        if self.disposed || self.command.is_none() {
+            return;
+        }
+        self.disposed = true;
+        for clause in [Clause::ConsumerCleanUp, Clause::CleanUpOrder, Clause::CancelAsked] {
+            ledger.pay(&self.debt(clause));
+        }
+        for clause in [Clause::Answered, Clause::UpdateAnswered] {
+            ledger.forgive(&self.debt(clause));
+        }
+        let there = self.status_there || self.ack_there || self.execution_status_there;
+        if self.is_terminal() && there {
+            self.owe(Clause::ProviderCleanUp, ledger, "what was said of it is not disposed");
+        } else if self.state.is_some() && !self.is_terminal() {
+            self.owe(Clause::CancelAnswered, ledger, "it was cancelled, and has not ended");
+        }
+    }
+
+    /// Who wrote an instance unregisters.
+    pub(super) fn unregistered(&mut self, role: Role, ledger: &mut Ledger) {
+        let state = self.state.clone().unwrap_or_default();
+        match role {
+            Role::Command => {
+                let held = self.disposed || self.command.is_none();
+                self.judge(Clause::ConsumerShutdown, held, ledger, || {
+                    "unregistered with its command on the bus".to_owned()
+                });
+            }
+            Role::Status => {
+                let held = self.state.is_none() || self.is_terminal();
+                self.judge(Clause::ProviderShutdown, held, ledger, || {
+                    format!("unregistered when it was {state}")
+                });
+            }
+            Role::Ack | Role::ExecutionStatus => {}
+        }
+        self.lost(role, ledger);
+    }
+
+    /// Who wrote an instance is gone, and owes nothing any longer.
+    pub(super) fn lost(&mut self, role: Role, ledger: &mut Ledger) {
+        let consumer = [Clause::ConsumerCleanUp];
+        let provider = [
+            Clause::Answered,
+            Clause::UpdateAnswered,
+            Clause::CancelAnswered,
+            Clause::ProviderCleanUp,
+            Clause::ExecutionStatus,
+        ];
+        let clauses = if role == Role::Command { &consumer[..] } else { &provider[..] };
+        for clause in clauses {
+            ledger.forgive(&self.debt(*clause));
+        }
+    }
+}
