@@ -6,6 +6,7 @@ mod join;
 mod lmcp;
 mod service_node;
 mod statistics;
+mod umaa;
 mod uxas;
 
 use super::exit::Failure;
@@ -14,7 +15,7 @@ use clap::Subcommand;
 /// Measure this machine: each figure beside a peer's or the limit's, turn about in the same run.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json\n  aldis bench lmcp --json\n  aldis bench join --instances 10000 --rate 1000 --json"
+    after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json\n  aldis bench lmcp --json\n  aldis bench join --instances 10000 --rate 1000 --json\n  aldis bench umaa --json"
 )]
 pub(crate) struct Bench {
     #[command(subcommand)]
@@ -31,6 +32,11 @@ enum What {
     Join(join::JoinBench),
     /// LMCP messages read and written on one core.
     Lmcp(lmcp::LmcpBench),
+    /// UMAA's flow control and retained instances, beside raw Zenoh.
+    Umaa(umaa::UmaaBench),
+    /// The provider of `bench umaa`.
+    #[command(hide = true)]
+    UmaaPeer(umaa::UmaaPeer),
     /// The other process of `bench bus`.
     #[command(hide = true)]
     BusPeer(bus::BusPeer),
@@ -50,6 +56,8 @@ impl Bench {
             What::Join(bench) => bench.run(),
             What::Joiner(joiner) => joiner.run(),
             What::Lmcp(bench) => bench.run(),
+            What::Umaa(bench) => bench.run(),
+            What::UmaaPeer(peer) => peer.run(),
             What::BusPeer(peer) => peer.run(),
             What::TcpCopy(copy) => copy.run(),
         }

@@ -1,6 +1,7 @@
 //! `aldis demo`: a shore station and three boats in one process, each with a Zenoh session of its own.
 
 mod board;
+mod control;
 mod fleet;
 mod screen;
 mod shore;
@@ -27,7 +28,8 @@ const STATUS_WITHIN: Duration = Duration::from_secs(10);
 /// A shore station and three boats in one process, each with a Zenoh session of its own.
 ///
 /// The boats move along simple tracks and tell where they are (LMCP) and how they do (UMAA HealthReport); shore calls
-/// them each second; boat 403 is silenced for a while and comes back.
+/// them each second; boat 403 is silenced for a while and comes back. A planner and an operator on shore contend for the
+/// autopilot of boat 401 (UMAA ResourceAllocation): the operator takes over by priority, the planner's time runs out.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  aldis demo\n  aldis demo --headless --seconds 15 --json")]
 pub(crate) struct Demo {
@@ -106,6 +108,11 @@ impl Demo {
             "calls_ok": result.calls_ok,
             "calls_failed": result.calls_failed,
             "calls_failed_elsewhere": result.calls_failed_elsewhere,
+            "allocations": {
+                "given": result.control.given, "expired": result.control.expired,
+                "taken_over": result.control.taken_over, "rejected": result.control.rejected,
+                "ended_otherwise": result.control.otherwise,
+            },
             "silenced": SILENCED,
             "seconds": result.ran.as_secs_f64().round(),
         });

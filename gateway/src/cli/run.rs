@@ -42,14 +42,13 @@ impl Run {
 pub(crate) fn watch_signals(end: impl FnOnce() + Send + 'static) -> Result<(), Failure> {
     let failed = |why: std::io::Error| Failure::Failed(format!("cannot watch for signals: {why}"));
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
+    // Watched from here on, not from when the thread comes to it.
+    let (mut interrupt, mut terminate) = {
+        let _context = runtime.enter();
+        (signal(SignalKind::interrupt()).map_err(failed)?, signal(SignalKind::terminate()).map_err(failed)?)
+    };
     let watch = move || {
         runtime.block_on(async {
-            let (Ok(mut interrupt), Ok(mut terminate)) =
-                (signal(SignalKind::interrupt()), signal(SignalKind::terminate()))
-            else {
-                tracing::error!("cannot watch for signals");
-                return;
-            };
             tokio::select! {
                 _ = interrupt.recv() => {}
                 _ = terminate.recv() => {}

@@ -132,6 +132,28 @@ impl BusPeer {
     }
 }
 
+/// Round trips of raw Zenoh to another process, for other measurements to stand beside.
+pub(super) struct RawTrips {
+    raw: raw::Raw,
+    _peer: Process,
+}
+
+impl RawTrips {
+    /// Starts the other process.
+    pub(super) fn start() -> Result<Self, Failure> {
+        let locator = format!("tcp/127.0.0.1:{}", free_port()?);
+        let mut raw = raw::Raw::listen(&locator)?;
+        let peer = Process::start(&["bench", "bus-peer", "--raw", "--connect", &locator])?;
+        raw.wait_for_peer()?;
+        Ok(Self { raw, _peer: peer })
+    }
+
+    /// Sends one message after the other, each when the answer to the former came.
+    pub(super) fn round_trips(&mut self, size: usize, count: u64) -> Result<Vec<Duration>, Failure> {
+        self.raw.round_trips(size, count)
+    }
+}
+
 /// The content of a message of a load.
 fn content(size: usize, last: bool) -> bytes::Bytes {
     let mut content = vec![0; size];

@@ -11,6 +11,26 @@ pub(super) const BOATS: [u64; 3] = [401, 402, 403];
 /// The one that is silenced for a while.
 pub(super) const SILENCED: u64 = 403;
 
+/// The one whose autopilot is contended for.
+pub(super) const CONTENDED: u64 = 401;
+
+/// How the contest for the autopilot goes.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Control {
+    /// Who holds it, and until when by the boat's clock, as its arbiter reports.
+    pub(super) holder: Option<(String, Option<String>)>,
+    /// Times that control was given.
+    pub(super) given: u64,
+    /// Times that it ended because its time was over.
+    pub(super) expired: u64,
+    /// Times that somebody of higher priority took it.
+    pub(super) taken_over: u64,
+    /// Times that it was refused because somebody of higher priority held it.
+    pub(super) rejected: u64,
+    /// Times that it ended in any other way.
+    pub(super) otherwise: u64,
+}
+
 /// What shore knows of one boat.
 #[derive(Debug, Default)]
 pub(super) struct Boat {
@@ -34,6 +54,8 @@ pub(super) struct Boat {
 pub(super) struct Board {
     pub(super) now: Monotonic,
     pub(super) boats: BTreeMap<EntityId, Boat>,
+    /// Who controls the autopilot.
+    pub(super) control: Control,
     /// The boat that is silenced now.
     pub(super) silenced: Option<u64>,
     /// Calls that failed though the boat was not silenced when they were made.
@@ -50,6 +72,7 @@ pub(super) struct Outcome {
     pub(super) calls_ok: u64,
     pub(super) calls_failed: u64,
     pub(super) calls_failed_elsewhere: u64,
+    pub(super) control: Control,
     pub(super) ran: Duration,
 }
 
@@ -69,6 +92,7 @@ impl Board {
             calls_ok: self.boats.values().map(|boat| boat.calls_ok).sum(),
             calls_failed: self.boats.values().map(|boat| boat.calls_failed).sum(),
             calls_failed_elsewhere: self.failed_elsewhere,
+            control: self.control.clone(),
             ran,
         }
     }

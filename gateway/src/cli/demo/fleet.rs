@@ -1,19 +1,23 @@
 //! The nodes of the demo.
 
-use super::board::{BOATS, Board, SILENCED};
+use super::board::{BOATS, Board, CONTENDED, SILENCED};
+use super::control::{self, Contender, Habit};
 use super::shore::ShoreDesk;
 use crate::cli::exit::Failure;
 use crate::cli::member::{Member, desk_service};
 use crate::config::Config;
 use crate::runtime::{self, Control};
 use aldis_envelope::aldis::NodeStatus;
-use aldis_envelope::umaa::{HealthReport, Topic};
-use aldis_envelope::{EntityId, Prefix, ServiceId, Source};
+use aldis_envelope::umaa::{HealthReport, ResourceAllocationReport, Topic};
+use aldis_envelope::{EntityId, GuidForm, Guids, Prefix, ServiceId, Source};
 use aldis_services::{ServiceSpec, track};
 use std::net::TcpListener;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;
+
+/// The name of the fleet.
+const FLEET: &str = "demo";
 
 /// The running fleet.
 pub(super) struct Fleet {
@@ -37,15 +41,18 @@ impl Fleet {
         let (tell, statuses) = mpsc::channel();
         let finish = Arc::new(AtomicBool::new(false));
         let boats = BOATS.map(EntityId::new).into_iter().collect::<Result<Vec<_>, _>>().map_err(failed)?;
-        let desk = ShoreDesk::new(board.clone(), boats, finish.clone(), tell);
+        let guids = Guids::new(&aldis_envelope::Fleet::new(FLEET).map_err(failed)?, GuidForm::Readable);
+        let desk = ShoreDesk::new(board.clone(), guids.clone(), boats, finish.clone(), tell);
         let entity = EntityId::new(1).map_err(failed)?;
         let source = Source::new(entity, ServiceId::new(100).map_err(failed)?);
-        let prefixes = [track::DESCRIPTOR, HealthReport::NAME].map(Prefix::new);
+        let prefixes =
+            [track::DESCRIPTOR, HealthReport::NAME, ResourceAllocationReport::NAME].map(Prefix::new);
         let prefixes = prefixes.into_iter().collect::<Result<Vec<_>, _>>().map_err(failed)?;
-        let desk = desk_service(source, prefixes, desk);
-        let shore = start(&shore_text(port), Some(desk))?;
+        let mut services = vec![desk_service(source, prefixes, desk)];
+        services.extend(contenders(board, &guids, entity)?);
+        let shore = start(&shore_text(port), services)?;
         let boats =
-            BOATS.iter().map(|&boat| start(&boat_text(boat, port), None)).collect::<Result<_, _>>()?;
+            BOATS.iter().map(|&boat| start(&boat_text(boat, port), Vec::new())).collect::<Result<_, _>>()?;
         Ok(Self { shore, boats, finish, statuses })
     }
 
@@ -73,11 +80,31 @@ impl Fleet {
     }
 }
 
-fn start(text: &str, desk: Option<ServiceSpec>) -> Result<Member, Failure> {
+/// The planner wants the autopilot most of the time; the operator goes before it, now and then.
+fn contenders(
+    board: &Arc<Mutex<Board>>,
+    guids: &Guids,
+    shore: EntityId,
+) -> Result<Vec<ServiceSpec>, Failure> {
+    let boat = EntityId::new(CONTENDED).map_err(failed)?;
+    let seconds = Duration::from_secs_f64;
+    let habits = [
+        (control::PLANNER, Habit { span: seconds(2.0), pause: seconds(0.5) }),
+        (control::OPERATOR, Habit { span: seconds(1.5), pause: seconds(3.7) }),
+    ];
+    let contender = |(service, habit): (u64, Habit)| {
+        let source = Source::new(shore, ServiceId::new(service).map_err(failed)?);
+        let contender = Contender::new(board.clone(), guids, source, boat, habit);
+        Ok(desk_service(source, contender.subscriptions(), contender))
+    };
+    habits.into_iter().map(contender).collect()
+}
+
+fn start(text: &str, services: Vec<ServiceSpec>) -> Result<Member, Failure> {
     let config = Config::parse("demo", text)?;
     let outside = runtime::outside(&config).map_err(failed)?;
     let mut node = runtime::node_config(&config);
-    node.services.extend(desk);
+    node.services.extend(services);
     Member::start(node, outside)
 }
 
@@ -95,9 +122,13 @@ fn boat_text(boat: u64, port: u16) -> String {
         "name = \"boat-{boat}\"\nfleet = \"demo\"\nentities = [{boat}]\noperators = [1]\n\
          [bus]\nmode = \"client\"\nconnect = [\"tcp/127.0.0.1:{port}\"]\n[health]\nreport_period_ms = 1000\n\
          [[service]]\nkind = \"track\"\nservice = 100\nlatitude_deg = {:.4}\nlongitude_deg = -71.35\n\
-         speed_m_per_s = {:.1}\nturn_rate_deg_per_s = {:.1}\nrate_hz = 10.0\n",
+         speed_m_per_s = {:.1}\nturn_rate_deg_per_s = {:.1}\nrate_hz = 10.0\n\
+         [[resource]]\nname = \"{}\"\npriorities = [\"eid1sid{}\", \"eid1sid{}\"]\n",
         41.40 + place * 0.02,
         4.0 + place * 2.0,
         place - 2.0,
+        control::RESOURCE,
+        control::PLANNER,
+        control::OPERATOR,
     )
 }

@@ -1,6 +1,6 @@
 //! The live table in the terminal.
 
-use super::board::Board;
+use super::board::{Board, CONTENDED};
 use crate::cli::print_line;
 use std::fmt::Write;
 use std::time::Duration;
@@ -46,6 +46,17 @@ pub(super) fn draw(board: &mut Board, ran: Duration) {
             let _ = writeln!(text, "      last failed call: {}", boat.last_failure);
         }
     }
+    let control = &board.control;
+    let held = match &control.holder {
+        None => "nobody".to_owned(),
+        Some((holder, None)) => holder.clone(),
+        Some((holder, Some(end))) => format!("{holder} until {end}"),
+    };
+    let _ = writeln!(
+        text,
+        "\nautopilot of boat {CONTENDED}: held by {held}; given {}, expired {}, taken over {}, rejected {}",
+        control.given, control.expired, control.taken_over, control.rejected
+    );
     if let Some(silenced) = board.silenced {
         let _ = writeln!(
             text,

@@ -3,10 +3,10 @@
 use super::board::{Board, SILENCED};
 use crate::cli::member::Desk;
 use aldis_envelope::aldis::{self, NodeStatus};
-use aldis_envelope::umaa::{self, ErrorCondition, HealthReport};
+use aldis_envelope::umaa::{self, ErrorCondition, HealthReport, ResourceAllocationReport, Topic};
 use aldis_envelope::{
-    Address, CallId, Change, ContentType, Descriptor, EntityId, Envelope, Guid, Monotonic, Now, Refusal,
-    ServiceId, Source, lmcp,
+    Address, CallId, Change, ContentType, Descriptor, EntityId, Envelope, Guid, Guids, Message, Monotonic,
+    Now, Refusal, ServiceId, Source, Wall, lmcp,
 };
 use aldis_services::{Input, Outbox, track};
 use bytes::Bytes;
@@ -32,6 +32,7 @@ enum Purpose {
 /// The shore station's service.
 pub(super) struct ShoreDesk {
     board: Arc<Mutex<Board>>,
+    guids: Guids,
     boats: Vec<EntityId>,
     finish: Arc<AtomicBool>,
     tell: mpsc::Sender<Vec<NodeStatus>>,
@@ -46,12 +47,14 @@ pub(super) struct ShoreDesk {
 impl ShoreDesk {
     pub(super) fn new(
         board: Arc<Mutex<Board>>,
+        guids: Guids,
         boats: Vec<EntityId>,
         finish: Arc<AtomicBool>,
         tell: mpsc::Sender<Vec<NodeStatus>>,
     ) -> Self {
         Self {
             board,
+            guids,
             boats,
             finish,
             tell,
@@ -117,6 +120,8 @@ impl ShoreDesk {
             if let Some(position) = position {
                 (boat.latitude, boat.longitude) = (position.latitude, position.longitude);
             }
+        } else if message.label.descriptor() == ResourceAllocationReport::NAME {
+            self.reported(message);
         } else if message.change == Change::Put
             && let Ok(report) = umaa::decode::<HealthReport>(&message.content)
         {
@@ -128,6 +133,18 @@ impl ShoreDesk {
                 boat.worst = worst;
             }
         }
+    }
+
+    /// Who controls the autopilot, as its arbiter says.
+    fn reported(&self, message: &Message) {
+        let report = umaa::decode::<ResourceAllocationReport>(&message.content).ok();
+        let session =
+            report.and_then(|report| report.control_info.iter().find_map(|info| info.control_session));
+        let named = |guid: Guid| self.guids.service(guid).map_or_else(|| guid.to_string(), |s| s.to_string());
+        self.board().control.holder = session.map(|session| {
+            let end = session.end_time.map(|end| Wall::from(end).to_string());
+            (named(session.controlling_consumer), end)
+        });
     }
 
     fn ended(&mut self, now: Now, id: CallId, outcome: Result<(), Refusal>) {
