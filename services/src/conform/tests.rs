@@ -3,6 +3,7 @@
 mod clean;
 mod planted;
 mod scene;
+mod watched;
 
 use super::*;
 use aldis_envelope::umaa::{self, ErrorCode, ErrorCondition, HealthReport, LongDescription};

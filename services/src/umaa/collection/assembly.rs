@@ -32,11 +32,16 @@ impl<S: Shape> Step<S> {
         }
     }
 
-    fn carry_out(self, elements: &mut Elements<S>) {
+    /// Carries it out. Whether elements came, went or changed places.
+    fn carry_out(self, elements: &mut Elements<S>) -> bool {
         match self {
-            Self::Put(sample) => elements.insert(S::stamp_of(&sample).0, sample),
-            Self::Remove(id) => elements.remove(&id),
-        };
+            Self::Put(sample) => {
+                let next = S::next_of(&sample);
+                let old = elements.insert(S::stamp_of(&sample).0, sample);
+                old.is_none_or(|old| S::next_of(&old) != next)
+            }
+            Self::Remove(id) => elements.remove(&id).is_some(),
+        }
     }
 }
 
@@ -95,8 +100,12 @@ pub(super) struct Assembly<S: Shape> {
     awaited: VecDeque<Awaited<S>>,
     /// What was said last of the state that was found last, or that was given up.
     judged: Option<Awaited<S>>,
-    /// The order of the base, where it is whole.
-    order: Option<Vec<Guid>>,
+    /// The order of the base, as it was when it was whole last.
+    order: Vec<Guid>,
+    /// Whether the base is whole.
+    whole: bool,
+    /// Whether that order holds for the base still.
+    in_order: bool,
     /// How many steps there were when the history of elements had been read: what is missing later is missing.
     history: Option<u64>,
     /// Whether reading it again would help.
@@ -119,7 +128,9 @@ impl<S: Shape> Assembly<S> {
             former: Elements::<S>::new(),
             awaited: VecDeque::new(),
             judged: None,
-            order: None,
+            order: Vec::new(),
+            whole: false,
+            in_order: false,
             history: live.then_some(0),
             wants_history: !live,
             damage: None,
@@ -170,9 +181,9 @@ impl<S: Shape> Assembly<S> {
         {
             let mark = step.mark();
             (self.base_end, self.base_newest) = (Some(mark), self.base_newest.max(mark.1));
-            step.carry_out(&mut self.base);
+            let moved = step.carry_out(&mut self.base);
             self.folded += 1;
-            self.order = None;
+            (self.whole, self.in_order) = (false, self.in_order && !moved);
         }
     }
 
@@ -226,8 +237,7 @@ impl<S: Shape> Assembly<S> {
         let mark = awaited.mark();
         awaited.at = self.find(&awaited);
         // Nobody will tell of a disposal before the history was read, but a history that is read now shows what it led to.
-        let beyond_history =
-            self.order.is_some() && self.history.is_some_and(|history| self.folded >= history);
+        let beyond_history = self.whole && self.history.is_some_and(|history| self.folded >= history);
         self.wants_history |= awaited.at.is_none() && !beyond_history && self.may_be_past(mark);
         self.awaited.push_back(awaited);
         if self.awaited.len() > AWAITED_MAX {
@@ -263,7 +273,7 @@ impl<S: Shape> Assembly<S> {
     /// Whether there is metadata without a stable state, and what is wrong with the state that it was held against.
     pub(super) fn unsettled(&self) -> Option<Option<Damage>> {
         let told = self.judged.is_some() || !self.awaited.is_empty();
-        (told && self.order.is_none()).then_some(self.damage)
+        (told && !self.whole).then_some(self.damage)
     }
 
     /// Elements may have been missed: what is known is held for the former state until it comes again.
@@ -290,16 +300,16 @@ impl<S: Shape> Assembly<S> {
     fn judge(&mut self, index: usize, at: u64) -> Option<Outcome> {
         self.fold(at);
         let judged = self.awaited.drain(..=index).next_back()?;
-        let order = S::order(&judged.metadata, &self.base);
+        let outcome = self.look_at(&judged.metadata);
         let ended_by_disposal = judged.mark().1.is_none();
         self.judged = Some(judged);
-        match order {
-            Ok(order) => {
-                (self.order, self.damage) = (Some(order), None);
+        match outcome {
+            Ok(()) => {
+                (self.whole, self.damage) = (true, None);
                 Some(Outcome::Stable)
             }
             Err(damage) => {
-                (self.order, self.damage) = (None, Some(damage));
+                (self.whole, self.damage) = (false, Some(damage));
                 // History gives of each element the latest sample alone, and no disposals: a state that the next update has
                 // begun to change is not to be had, and nothing is wrong. Nor where a disposal is meant that is yet to come.
                 let certain = self.history.is_some_and(|history| at > history) && !ended_by_disposal;
@@ -307,6 +317,20 @@ impl<S: Shape> Assembly<S> {
                 certain.then_some(Outcome::Damaged(damage))
             }
         }
+    }
+
+    /// Whether the base is what metadata says. As long as elements only change their values, their order need not be worked
+    /// out again.
+    fn look_at(&mut self, metadata: &S::Metadata) -> Result<(), Damage> {
+        let size = S::end_of(metadata).size.get();
+        let start = S::start_of(metadata).filter(|_| size > 0);
+        let same_start = start.is_none() || start == self.order.first().copied();
+        if !(self.in_order && same_start && size == self.order.len()) {
+            self.in_order = false;
+            self.order = S::order(metadata, &self.base)?;
+            self.in_order = true;
+        }
+        Ok(())
     }
 
     /// How many steps lead to the state of some metadata; none where its samples have not all come, or are folded away.
@@ -336,6 +360,6 @@ impl<S: Shape> Assembly<S> {
 
     /// The elements of the latest stable state in their order; none where there is no such state.
     pub(super) fn stable(&self) -> Option<impl ExactSizeIterator<Item = &Arc<S::Sample>>> {
-        Some(self.order.as_ref()?.iter().map(|id| &self.base[id]))
+        self.whole.then(|| self.order.iter().map(|id| &self.base[id]))
     }
 }

@@ -81,22 +81,23 @@ impl<C: LargeCollection> ListProvider<C> {
         now: DateTime,
         changes: impl IntoIterator<Item = ListChange<C::Element>>,
     ) -> Result<Option<Update<ListElement<C>, LargeListMetadata>>, ChangeError> {
-        let Wanted { order, mut values, .. } = self.wanted(changes)?;
+        let Wanted { order, mut values, removed, touched, .. } = self.wanted(changes)?;
         let size = size(order.len())?;
 
-        let kept: BTreeSet<_> = order.iter().collect();
-        let disposed = self.elements.keys().filter(|id| !kept.contains(id));
-        let mut changes: Vec<_> = disposed.copied().map(ElementChange::Dispose).collect();
-        let links: Vec<_> =
-            order.iter().copied().zip(order.iter().skip(1).copied().map(Some).chain([None])).collect();
-        let as_it_was = |(id, next): &(Guid, Option<Guid>)| {
-            !values.contains_key(id) && self.elements.get(id).is_some_and(|old| old.next_element_id == *next)
+        let gone =
+            removed.into_iter().filter(|id| self.elements.contains_key(id) && !values.contains_key(id));
+        let mut changes: Vec<_> = gone.map(ElementChange::Dispose).collect();
+        let link = |position: usize| (order[position], order.get(position + 1).copied());
+        let changed = |(id, next): &(Guid, Option<Guid>)| {
+            let old = self.elements.get(id).filter(|_| !values.contains_key(id));
+            old.is_none_or(|old| old.next_element_id != *next)
         };
+        let positions = (0..order.len()).filter(|position| touched.contains(&order[*position]));
+        let mut puts: Vec<_> = positions.map(link).filter(changed).collect();
         // Without a new sample the update would end with a disposal: the first element that stays is put again.
-        let again = !changes.is_empty() && links.iter().all(as_it_was);
-        let stays =
-            |(position, link): &(usize, &(Guid, Option<Guid>))| as_it_was(link) && !(again && *position == 0);
-        let puts: Vec<_> = links.iter().enumerate().filter(|at| !stays(at)).map(|(_, link)| *link).collect();
+        if puts.is_empty() && !changes.is_empty() && !order.is_empty() {
+            puts.push(link(0));
+        }
         for (element_id, next_element_id) in puts {
             let old = || self.elements.get(&element_id).map(|old| old.element.clone());
             let element = values.remove(&element_id).or_else(old).ok_or(ChangeError::Missing(element_id))?;
@@ -126,8 +127,9 @@ impl<C: LargeCollection> ListProvider<C> {
         &self,
         changes: impl IntoIterator<Item = ListChange<C::Element>>,
     ) -> Result<Wanted<'_, C>, ChangeError> {
-        let (order, values, removed) = (self.order.clone(), BTreeMap::new(), BTreeSet::new());
-        let mut wanted = Wanted { old: &self.elements, order, values, removed };
+        let (order, values) = (self.order.clone(), BTreeMap::new());
+        let (removed, touched) = (BTreeSet::new(), BTreeSet::new());
+        let mut wanted = Wanted { old: &self.elements, order, values, removed, touched };
         for change in changes {
             match change {
                 ListChange::Insert(at, id, element) => wanted.insert(at, id, element)?,
@@ -155,6 +157,8 @@ struct Wanted<'a, C: LargeCollection> {
     /// The values that are new.
     values: BTreeMap<Guid, C::Element>,
     removed: BTreeSet<Guid>,
+    /// Elements whose value or successor has been another in between: no others need to be looked at.
+    touched: BTreeSet<Guid>,
 }
 
 impl<C: LargeCollection> Wanted<'_, C> {
@@ -179,13 +183,19 @@ impl<C: LargeCollection> Wanted<'_, C> {
             return Err(ChangeError::Missing(id));
         }
         self.values.insert(id, element);
+        self.touched.insert(id);
         Ok(())
     }
 
     fn take(&mut self, id: Guid) -> Result<(), ChangeError> {
         let from = self.order.iter().position(|other| *other == id).ok_or(ChangeError::Missing(id))?;
         self.order.remove(from);
+        self.touch_before(from);
         Ok(())
+    }
+
+    fn touch_before(&mut self, position: usize) {
+        self.touched.extend(position.checked_sub(1).map(|before| self.order[before]));
     }
 
     fn place(&mut self, at: usize, id: Guid) -> Result<(), ChangeError> {
@@ -194,6 +204,8 @@ impl<C: LargeCollection> Wanted<'_, C> {
             return Err(ChangeError::Position { at, length });
         }
         self.order.insert(at, id);
+        self.touched.insert(id);
+        self.touch_before(at);
         Ok(())
     }
 }

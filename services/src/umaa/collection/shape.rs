@@ -25,8 +25,14 @@ pub trait Shape: fmt::Debug + Sized {
     /// The element's id and timestamp.
     fn stamp_of(sample: &Self::Sample) -> (Guid, DateTime);
 
+    /// The element after it; none where there is none, or no order.
+    fn next_of(sample: &Self::Sample) -> Option<Guid>;
+
     /// How an update ends.
     fn end_of(metadata: &Self::Metadata) -> UpdateEnd;
+
+    /// Where the collection starts; none where there is no order.
+    fn start_of(metadata: &Self::Metadata) -> Option<Guid>;
 
     /// The order of the elements, where the collection is whole.
     ///
@@ -108,6 +114,14 @@ impl<C: LargeCollection> Shape for Sets<C> {
         (sample.element_id, sample.element_timestamp)
     }
 
+    fn next_of(_: &SetElement<C>) -> Option<Guid> {
+        None
+    }
+
+    fn start_of(_: &LargeSetMetadata) -> Option<Guid> {
+        None
+    }
+
     fn end_of(metadata: &LargeSetMetadata) -> UpdateEnd {
         UpdateEnd {
             collection: metadata.set_id,
@@ -136,6 +150,14 @@ impl<C: LargeCollection> Shape for Lists<C> {
 
     fn stamp_of(sample: &ListElement<C>) -> (Guid, DateTime) {
         (sample.element_id, sample.element_timestamp)
+    }
+
+    fn next_of(sample: &ListElement<C>) -> Option<Guid> {
+        sample.next_element_id
+    }
+
+    fn start_of(metadata: &LargeListMetadata) -> Option<Guid> {
+        Some(metadata.starting_element_id)
     }
 
     fn end_of(metadata: &LargeListMetadata) -> UpdateEnd {
