@@ -3,5 +3,6 @@
 pub(crate) mod asking;
 pub(crate) mod bus;
 pub(crate) mod checker;
+mod random;
 pub(crate) mod sea;
 pub(crate) mod vector;

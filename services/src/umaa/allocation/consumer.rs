@@ -121,9 +121,24 @@ impl<C: Command> ControlledConsumer<C> {
         }
     }
 
-    /// The command of a task, for updates of it.
-    pub fn command(&self, task: TaskId) -> Option<Guid> {
-        self.tasks.get(&task)?.command
+    /// Replaces the command of a task by a newer one of the same session (ICD 4.1.4.2).
+    ///
+    /// # Errors
+    /// [`ConsumerError`] when the command is not on the bus, or not open any more.
+    pub fn update(
+        &mut self,
+        now: Now,
+        task: TaskId,
+        command: C,
+        out: &mut Outbox,
+    ) -> Result<(), ConsumerError> {
+        let session = self.tasks.get(&task).and_then(|task| task.command);
+        self.commands.update(now, session.unwrap_or(Guid::NIL), command, out)
+    }
+
+    /// The tasks whose ends have not been told.
+    pub fn tasks(&self) -> Vec<TaskId> {
+        self.tasks.iter().filter(|(_, task)| !task.ended).map(|(&id, _)| id).collect()
     }
 
     /// Takes one input of the service, and says what came of it.

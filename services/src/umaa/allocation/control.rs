@@ -302,7 +302,9 @@ impl Executor<ResourceAllocationCommand> for Control {
         match input {
             Input::Recovered(envelope) => self.recovered(envelope, out),
             Input::Message(envelope) => self.rival(envelope, out),
-            Input::HistoryComplete(_) => (self.stage, self.changed) = (Stage::Reporting, true),
+            Input::HistoryComplete(_) if self.stage == Stage::Listening => {
+                (self.stage, self.changed) = (Stage::Reporting, true);
+            }
             Input::Confirmed(number, Ok(())) => self.confirmed(*number, Confirmation::Given),
             Input::Confirmed(number, Err(why)) => {
                 self.confirmed(*number, Confirmation::Refused(why.to_string()));

@@ -30,12 +30,22 @@ impl GuardSettings {
     }
 }
 
+/// How old what an arbiter said is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Age {
+    /// It was said before this guard was there, it is not known when.
+    Unknown,
+    /// It was news then.
+    Since(Monotonic),
+    /// Its writer has been out of contact since.
+    Lost,
+}
+
 /// What an arbiter last said of the resource.
 #[derive(Debug, Clone)]
 struct Heard {
     writer: Source,
-    /// When it was heard, where it was news: what was retained before this guard was there has no age.
-    at: Option<Monotonic>,
+    age: Age,
     /// Who controls the resource, and when that ends on the own clock.
     holder: Option<(Guid, Option<Monotonic>)>,
 }
@@ -74,15 +84,23 @@ impl Guard {
     /// What arbiters say that may be believed now.
     fn believed(&self, now: Now) -> impl Iterator<Item = &Heard> {
         let within = believed_for(self.settings.reader_lease);
-        self.heard.values().filter(move |heard| heard.at.is_some_and(|at| now.monotonic - at < within))
+        let is_fresh = move |age| matches!(age, Age::Since(at) if now.monotonic - at < within);
+        self.heard.values().filter(move |heard| is_fresh(heard.age))
     }
 
     /// The holder, as far as one arbiter alone says so and its time is not over.
     fn holder(&self, now: Now) -> Option<Guid> {
-        let mut believed = self.believed(now);
-        let (only, other) = (believed.next()?, believed.next());
-        let (holder, ends) = only.holder?;
-        (other.is_none() && ends.is_none_or(|ends| now.monotonic < ends)).then_some(holder)
+        only_holder(now, self.believed(now))
+    }
+
+    /// Who has to be taken for the holder where it is a matter of ending commands. A guard that has just started has
+    /// confirmed what it was told of the past: whoever that names is in control already, and what this provider executed in a
+    /// former life for another must not go on until the next repetition.
+    fn successor(&self, now: Now) -> Option<Guid> {
+        match self.believed(now).next() {
+            Some(_) => self.holder(now),
+            None => only_holder(now, self.heard.values().filter(|heard| heard.age != Age::Lost)),
+        }
     }
 
     /// Whether a consumer is a provider of the resource itself, as all say who know of the resource.
@@ -119,13 +137,13 @@ impl Guard {
                 .map(|end| now.monotonic + Duration::from_nanos(u64::try_from(left(end)).unwrap_or(0)));
             (session.controlling_consumer, ends)
         });
-        let at = self.is_news.then_some(now.monotonic);
+        let age = if self.is_news { Age::Since(now.monotonic) } else { Age::Unknown };
         if self.heard.len() >= ARBITERS_MAX && !self.heard.contains_key(&report.source) {
             let believed: BTreeSet<_> = self.believed(now).map(|heard| heard.writer).collect();
             self.heard.retain(|_, heard| believed.contains(&heard.writer));
         }
         if self.heard.len() < ARBITERS_MAX || self.heard.contains_key(&report.source) {
-            self.heard.insert(report.source, Heard { writer, at, holder });
+            self.heard.insert(report.source, Heard { writer, age, holder });
         }
     }
 
@@ -172,7 +190,7 @@ impl Guard {
     /// Nothing is heard of a writer any more: until it is heard again, it names nobody.
     fn lost(&mut self, is_lost: impl Fn(Source) -> bool) {
         for heard in self.heard.values_mut().filter(|heard| is_lost(heard.writer)) {
-            heard.at = None;
+            heard.age = Age::Lost;
         }
     }
 
@@ -237,7 +255,7 @@ impl Admission for Guard {
     }
 
     fn ends(&self, now: Now, consumer: Guid) -> Option<Failure> {
-        let holder = self.holder(now).filter(|holder| *holder != consumer)?;
+        let holder = self.successor(now).filter(|holder| *holder != consumer)?;
         let text = || format!("{holder} controls {} now", self.settings.resource);
         (!self.is_related(consumer)).then(|| failure_at_preemption(text()))
     }
@@ -245,6 +263,13 @@ impl Admission for Guard {
     fn next_deadline(&self) -> Option<Monotonic> {
         self.waits_until
     }
+}
+
+/// The holder that the one arbiter names which there is, while its time is not over.
+fn only_holder<'a>(now: Now, mut heard: impl Iterator<Item = &'a Heard>) -> Option<Guid> {
+    let (only, other) = (heard.next()?, heard.next());
+    let (holder, ends) = only.holder?;
+    (other.is_none() && ends.is_none_or(|ends| now.monotonic < ends)).then_some(holder)
 }
 
 #[cfg(test)]

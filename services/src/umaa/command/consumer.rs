@@ -186,8 +186,7 @@ impl<C: Command> Consumer<C> {
         if self.held.len() >= self.settings.sessions_max {
             return Err(ConsumerError::TooMany(self.settings.sessions_max));
         }
-        self.sessions_begun += 1;
-        let session_id = self.guids.of_session(self.guid, now.wall, self.sessions_begun);
+        let session_id = self.new_session(now);
         let time_stamp = now.wall.into();
         command.set_header(CommandHeader { time_stamp, source: self.guid, session_id, destination });
         self.commands.put(&command, out);
@@ -239,6 +238,17 @@ impl<C: Command> Consumer<C> {
     /// When it wants [`Input::Deadline`](crate::Input::Deadline).
     pub fn next_deadline(&self) -> Option<Monotonic> {
         self.held.values().filter_map(|held| held.limit).min()
+    }
+
+    /// A session id that no command of this life or the former one has: a clock may stand still while a process restarts.
+    fn new_session(&mut self, now: Now) -> Guid {
+        loop {
+            self.sessions_begun += 1;
+            let session = self.guids.of_session(self.guid, now.wall, self.sessions_begun);
+            if !self.held.contains_key(&session) {
+                return session;
+            }
+        }
     }
 
     fn hold(&mut self, command: C) -> &mut Held<C> {

@@ -95,8 +95,11 @@ impl<P: Part> Service for Asking<P> {
     }
 
     fn handle(&mut self, now: Now, input: Input<'_>, out: &mut Outbox) {
-        for wish in std::mem::take(&mut *self.handle.wishes.lock().unwrap()) {
-            wish(&mut self.part, now, out);
+        // What a former life left is known before anything new is begun.
+        if !matches!(input, Input::Started | Input::Recovered(_)) {
+            for wish in std::mem::take(&mut *self.handle.wishes.lock().unwrap()) {
+                wish(&mut self.part, now, out);
+            }
         }
         let told = self.part.handle(now, &input, out);
         self.handle.heard.lock().unwrap().extend(told);

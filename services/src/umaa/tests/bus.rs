@@ -54,6 +54,10 @@ struct Machine {
     /// Whether it counts as a reader and its token is alive.
     is_known: bool,
     lives: u64,
+    /// When its deadline is to come.
+    armed: Option<Monotonic>,
+    /// What it has heard in this life, by writer and sequence.
+    heard: BTreeSet<(Source, u64)>,
 }
 
 /// A sample that waits for its readers.
@@ -106,8 +110,9 @@ impl Bus {
     /// Adds a service whose wall clock is wrong by so many nanoseconds, and starts it.
     pub(crate) fn add(&mut self, source: Source, clock_offset: i64, factory: Factory) {
         let (retained, silent_since, is_known, lives) = (BTreeMap::new(), None, false, 0);
-        let running = None;
-        let machine = Machine { factory, running, clock_offset, retained, silent_since, is_known, lives };
+        let (running, armed, heard) = (None, None, BTreeSet::new());
+        let machine =
+            Machine { factory, running, clock_offset, retained, silent_since, is_known, lives, armed, heard };
         self.machines.insert(source, machine);
         self.start(source);
     }
@@ -119,6 +124,8 @@ impl Bus {
         let prefixes = service.subscriptions();
         machine.running = Some(Running { service, outbox: Outbox::new(source), prefixes });
         (machine.silent_since, machine.is_known, machine.lives) = (None, true, machine.lives + 1);
+        machine.armed = None;
+        machine.heard.clear();
         let own: Vec<_> = machine.retained.values().cloned().collect();
         self.arrivals.retain(|_, (to, _)| *to != source);
         self.held_back.retain(|(_, to), _| *to != source);
@@ -135,13 +142,40 @@ impl Bus {
                 continue;
             }
             self.give_token(source, other, true);
-            let told: Vec<_> = self.machines[&other].retained.values().cloned().collect();
-            for told in told.iter().filter(|told| self.receives(source, told)).collect::<Vec<_>>() {
-                self.give(source, Input::Message(told));
+            for told in self.unheard(other, source) {
+                self.hear(source, other, &told);
             }
         }
         self.give(source, Input::HistoryComplete(all_is_told));
         self.tell_all(source, true);
+        // What it retains reaches those who came while it was away.
+        let others: Vec<_> = self.machines.keys().copied().filter(|other| *other != source).collect();
+        for other in others {
+            for told in self.unheard(source, other) {
+                self.arrive(source, other, Arrival::Message(source, told));
+            }
+        }
+    }
+
+    /// What one retains that another has not heard, in the order of its writing.
+    fn unheard(&self, from: Source, to: Source) -> Vec<Envelope> {
+        let heard = &self.machines[&to].heard;
+        let retained = self.machines[&from].retained.values();
+        let unheard = retained.filter(|told| !heard.contains(&(from, told.stamp.sequence)));
+        let mut unheard: Vec<_> = unheard.filter(|told| self.receives(to, told)).cloned().collect();
+        unheard.sort_by_key(|told| told.stamp.sequence);
+        unheard
+    }
+
+    /// A sample reaches a service, once.
+    fn hear(&mut self, to: Source, from: Source, envelope: &Envelope) {
+        let sequence = envelope.stamp.sequence;
+        if self.receives(to, envelope) && self.machines.get_mut(&to).unwrap().heard.insert((from, sequence)) {
+            self.give(to, Input::Message(envelope));
+            if self.confirming.contains_key(&sequence) {
+                self.arrive(to, from, Arrival::Acknowledged(to, sequence));
+            }
+        }
     }
 
     /// A service is gone without a word. What is journaled stays, what is on its way too.
@@ -184,6 +218,9 @@ impl Bus {
                 for arrival in self.held_back.remove(&(from, to)).unwrap_or_default() {
                     self.arrive(from, to, arrival);
                 }
+                for told in self.unheard(from, to) {
+                    self.arrive(from, to, Arrival::Message(from, told));
+                }
             }
         }
     }
@@ -218,15 +255,7 @@ impl Bus {
 
     fn take(&mut self, to: Source, arrival: Arrival) {
         match arrival {
-            Arrival::Message(from, envelope) => {
-                if self.receives(to, &envelope) {
-                    self.give(to, Input::Message(&envelope));
-                    let sequence = envelope.stamp.sequence;
-                    if self.confirming.contains_key(&sequence) {
-                        self.arrive(to, from, Arrival::Acknowledged(to, sequence));
-                    }
-                }
-            }
+            Arrival::Message(from, envelope) => self.hear(to, from, &envelope),
             Arrival::Acknowledged(reader, sequence) => {
                 if let Some(waiting) = self.confirming.get_mut(&sequence) {
                     waiting.missing.remove(&reader);
@@ -244,9 +273,9 @@ impl Bus {
             }
             Arrival::Token(..) => {}
             Arrival::Deadline(at) => {
-                let wanted =
-                    self.machines[&to].running.as_ref().and_then(|running| running.service.next_deadline());
-                if wanted.is_some_and(|wanted| wanted <= at) {
+                let armed = &mut self.machines.get_mut(&to).unwrap().armed;
+                if *armed == Some(at) {
+                    *armed = None;
                     self.give(to, Input::Deadline);
                 }
             }
@@ -316,9 +345,13 @@ impl Bus {
                 _ => panic!("{source} wants something that this bus does not have"),
             }
         }
-        if let Some(at) = deadline {
-            let at = at.max(self.now);
-            self.at(at, source, Arrival::Deadline(at));
+        let machine = self.machines.get_mut(&source).unwrap();
+        let deadline = deadline.map(|at| at.max(self.now));
+        if machine.armed != deadline {
+            machine.armed = deadline;
+            if let Some(at) = deadline {
+                self.at(at, source, Arrival::Deadline(at));
+            }
         }
     }
 

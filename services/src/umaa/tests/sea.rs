@@ -95,7 +95,9 @@ pub(crate) fn add_steersman(bus: &mut Bus, at: Source) -> Seen<String> {
         -90_000_000_000,
         Arc::new(move || {
             let guard = Guard::new(at, guids(), GuardSettings::new(AUTOPILOT));
-            provider(at, &guids(), ProviderSettings::default(), guard, given.clone())
+            let settings =
+                ProviderSettings { execute_within: Some(60 * SECOND), ..ProviderSettings::default() };
+            provider(at, &guids(), settings, guard, given.clone())
         }),
     );
     asked

@@ -96,6 +96,9 @@ impl Executor<VectorCommand> for Steering {
                 Verdict::Failed(Failure::new(FailureKind::Invalid, "the course is outside 0 to 360 degrees"))
             }
             "dead at validation" => Verdict::Failed(Failure::new(FailureKind::Resource, "no rudder answers")),
+            "interrupted at validation" => {
+                Verdict::Failed(Failure::new(FailureKind::Interrupted, "somebody has the wheel"))
+            }
             "slow to validate" => Verdict::Later,
             _ => Verdict::Valid,
         }

@@ -127,6 +127,9 @@ fn what_was_retained_before_is_believed_once_it_is_repeated() {
     // Its age is not known, so the answer waits for the next repetition, but not for ever.
     assert_eq!(watch.guard.admits(now(1.0), ONE), Verdict::Later);
     assert_eq!(watch.guard.next_deadline(), Some(now(6.0).monotonic));
+    // What it executed for another in a former life ends at once: the one who is named may be in control already.
+    assert!(watch.guard.ends(now(0.0), OTHER).is_some());
+    assert_eq!(watch.guard.ends(now(0.0), ONE), None);
     watch.hear(2.0, arbiter(), Some((ONE, Some(58))));
     assert!(watch.admits(2.0, ONE));
     let guard = Guard::new(source(400, 100), guids(), GuardSettings::new(RESOURCE));

@@ -6,6 +6,7 @@
 //! | with a status that is not terminal | its executor goes on from there, or it fails with SERVICE_FAILED |
 //! | with a terminal one | nothing is published, the consumer's dispose is awaited |
 //! | updated since it was acknowledged | as the update that it is |
+//! | a status that is not terminal, without its command | FAILED / SERVICE_FAILED: nobody executes it |
 //! | status, acknowledgement or execution status without their command | disposed, once the command cannot come any more |
 
 use super::super::decisions::{is_orphan, is_update};
@@ -14,7 +15,10 @@ use super::super::session::{Event, Session};
 use super::super::writer::is_about;
 use super::{Provider, Stage};
 use crate::service::Outbox;
-use aldis_envelope::umaa::{self, Command, CommandAckReport, CommandState, CommandStatus, Key, Topic};
+use aldis_envelope::umaa::{
+    self, Command, CommandAckReport, CommandState, CommandStatus, CommandStatusReason, Key, LongDescription,
+    Topic,
+};
 use aldis_envelope::{Change, Envelope, Guid, KeyHash, Monotonic, Now, Source};
 use std::collections::BTreeMap;
 
@@ -166,16 +170,30 @@ impl<C: Command, E: Executor<C>, A: Admission> Provider<C, E, A> {
         }
     }
 
+    /// What a former life said of commands that nobody knows. Where everybody here has told what there is, nobody executes
+    /// such a command any more, and its status must not say so.
     pub(super) fn give_up_orphans(&mut self, now: Now, all_is_told: bool, out: &mut Outbox) {
         let Some(wait_ends) = self.past.wait_ends else { return };
-        let orphan =
-            |left: &Left<C>| is_orphan(all_is_told && left.consumer_is_here, now.monotonic, wait_ends);
-        let orphans = self.past.left.iter().filter(|(_, left)| orphan(left));
-        let orphans: Vec<_> = orphans.map(|(&session, left)| (session, left.execution_status)).collect();
-        for (session, execution_status) in orphans {
-            self.past.left.remove(&session);
-            self.dispose_past(session, execution_status, out);
+        let sessions: Vec<Guid> = self.past.left.keys().copied().collect();
+        for session in sessions {
+            let Some(left) = self.past.left.get_mut(&session) else { continue };
+            if is_orphan(all_is_told && left.consumer_is_here, now.monotonic, wait_ends) {
+                let execution_status = left.execution_status;
+                self.past.left.remove(&session);
+                self.dispose_past(session, execution_status, out);
+            } else if all_is_told && left.state.is_some_and(|state| !state.is_terminal()) {
+                left.state = Some(CommandState::Failed);
+                let text = "its command was gone when its provider started again";
+                self.publish_past(now, session, text, out);
+            }
         }
+    }
+
+    fn publish_past(&self, now: Now, session: Guid, text: &str, out: &mut Outbox) {
+        let (state, reason) = (CommandState::Failed, CommandStatusReason::ServiceFailed);
+        let text = LongDescription::shortened(text);
+        let status = CommandStatus::new(now.wall.into(), self.key(session), state, reason, text);
+        self.statuses.put(&status, out);
     }
 
     fn dispose_past(&self, session: Guid, execution_status: bool, out: &mut Outbox) {
