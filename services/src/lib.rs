@@ -10,6 +10,7 @@ pub mod counters;
 pub mod event;
 pub mod health;
 mod host;
+pub mod journal;
 mod labels;
 pub mod log;
 pub mod map;
