@@ -2,6 +2,7 @@
 
 mod bus;
 mod child;
+mod journal;
 mod statistics;
 mod uxas;
 
@@ -10,7 +11,9 @@ use clap::Subcommand;
 
 /// Measure this machine: each figure beside a peer's or the limit's, turn about in the same run.
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json")]
+#[command(
+    after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json\n  aldis bench journal --json"
+)]
 pub(crate) struct Bench {
     #[command(subcommand)]
     what: What,
@@ -22,12 +25,17 @@ enum What {
     Bus(bus::BusBench),
     /// From a UxAS stream through a node to a UxAS stream, against a plain TCP copy.
     Uxas(uxas::UxasBench),
+    /// Records on disk a second, against plain writes and syncs; restarts.
+    Journal(journal::JournalBench),
     /// The other process of `bench bus`.
     #[command(hide = true)]
     BusPeer(bus::BusPeer),
     /// The plain TCP copy of `bench uxas`.
     #[command(hide = true)]
     TcpCopy(uxas::TcpCopy),
+    /// The other process of `bench journal`.
+    #[command(hide = true)]
+    JournalPeer(journal::JournalPeer),
 }
 
 impl Bench {
@@ -35,8 +43,10 @@ impl Bench {
         match self.what {
             What::Bus(bench) => bench.run(),
             What::Uxas(bench) => bench.run(),
+            What::Journal(bench) => bench.run(),
             What::BusPeer(peer) => peer.run(),
             What::TcpCopy(copy) => copy.run(),
+            What::JournalPeer(peer) => peer.run(),
         }
     }
 }

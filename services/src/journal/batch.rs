@@ -107,7 +107,7 @@ impl Batch {
     }
 
     /// Its size on disk, without the frame around it.
-    pub(super) fn encoded_bytes(&self) -> usize {
+    pub fn encoded_bytes(&self) -> usize {
         self.bytes
     }
 
