@@ -7,6 +7,7 @@ mod bus;
 mod cli;
 mod clock;
 mod config;
+mod journal;
 mod runtime;
 
 fn main() -> std::process::ExitCode {

@@ -12,6 +12,7 @@ pub mod dds;
 pub mod event;
 pub mod health;
 mod host;
+pub mod journal;
 mod labels;
 pub mod log;
 pub mod map;

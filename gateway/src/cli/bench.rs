@@ -3,6 +3,7 @@
 mod bus;
 mod child;
 mod join;
+mod journal;
 mod lmcp;
 mod service_node;
 mod statistics;
@@ -15,7 +16,7 @@ use clap::Subcommand;
 /// Measure this machine: each figure beside a peer's or the limit's, turn about in the same run.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json\n  aldis bench lmcp --json\n  aldis bench join --instances 10000 --rate 1000 --json\n  aldis bench umaa --json"
+    after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json\n  aldis bench lmcp --json\n  aldis bench join --instances 10000 --rate 1000 --json\n  aldis bench umaa --json\n  aldis bench journal --json"
 )]
 pub(crate) struct Bench {
     #[command(subcommand)]
@@ -37,6 +38,8 @@ enum What {
     /// The provider of `bench umaa`.
     #[command(hide = true)]
     UmaaPeer(umaa::UmaaPeer),
+    /// Records on disk a second, against plain writes and syncs; restarts.
+    Journal(journal::JournalBench),
     /// The other process of `bench bus`.
     #[command(hide = true)]
     BusPeer(bus::BusPeer),
@@ -46,6 +49,9 @@ enum What {
     /// The plain TCP copy of `bench uxas`.
     #[command(hide = true)]
     TcpCopy(uxas::TcpCopy),
+    /// The other process of `bench journal`.
+    #[command(hide = true)]
+    JournalPeer(journal::JournalPeer),
 }
 
 impl Bench {
@@ -58,8 +64,10 @@ impl Bench {
             What::Lmcp(bench) => bench.run(),
             What::Umaa(bench) => bench.run(),
             What::UmaaPeer(peer) => peer.run(),
+            What::Journal(bench) => bench.run(),
             What::BusPeer(peer) => peer.run(),
             What::TcpCopy(copy) => copy.run(),
+            What::JournalPeer(peer) => peer.run(),
         }
     }
 }

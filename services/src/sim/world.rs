@@ -1,40 +1,57 @@
-//! A world of nodes that share a bus: ordered and reliable between open sessions, with delays drawn from the seed.
+//! A world of machines in virtual time. Within a site the bus is ordered and reliable while it is up, as Zenoh's is; what fails
+//! is told by `world/faults`.
 
-use super::network::meets;
-use crate::event::{BridgeId, Effect, Event, PeerEvent, PeerId, PublisherId};
+mod bus;
+mod faults;
+mod storage;
+
+use super::machine::{Clocks, Machine};
+use super::observe::{Checker, Facts, Observation, Seen, Violation};
+use super::trace::Trace;
+use crate::event::{BridgeId, Effect, Event, PeerEvent, PeerId};
 use crate::node::{Node, NodeConfig};
-use aldis_envelope::codec::native::{Decoder, encode_variable};
-use aldis_envelope::{Change, Envelope, Keys, Label, Monotonic, Now, Source, Wall};
+use aldis_envelope::{BootId, Keys, Label, Monotonic, Now};
 use bytes::Bytes;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
+use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A node of the world.
+/// A node of the world, by its machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct NodeHandle(usize);
 
-/// The wall clock at the start of every world: 2026-11-22, in nanoseconds.
-const EPOCH: i64 = 1_795_305_600_000_000_000;
-
-struct Machine {
-    node: Node,
-    keys: Keys,
-    decoder: Decoder,
-    open: bool,
-    subscriptions: Vec<String>,
-    publishers: BTreeMap<PublisherId, (String, Vec<u8>)>,
-    tokens: BTreeSet<Source>,
-    armed: Option<Monotonic>,
-    sent: Vec<(BridgeId, PeerId, Arc<Label>, Bytes)>,
-    exited: bool,
+impl NodeHandle {
+    pub(super) fn place(self) -> usize {
+        self.0
+    }
 }
 
-/// What is on its way to a node.
+impl fmt::Display for NodeHandle {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "node {}", self.0)
+    }
+}
+
+/// What is on its way to a machine.
 enum Arrival {
-    Sample { key: String, deleted: bool, header: Vec<u8>, content: Bytes },
+    Sample {
+        from: usize,
+        key: String,
+        deleted: bool,
+        header: Vec<u8>,
+        content: Bytes,
+    },
     Event(Event),
     Deadline,
+    /// The disk is done.
+    Disk,
+    /// The journal wants to try its disk again.
+    JournalDeadline,
+    /// The loss of the session is noticed, by the machine and by the others.
+    SessionLost,
+    /// The others notice which tokens are there.
+    Tokens,
 }
 
 /// A simulated world.
@@ -44,9 +61,17 @@ pub struct World {
     machines: Vec<Machine>,
     arrivals: BTreeMap<(Monotonic, u64), (usize, Arrival)>,
     counter: u64,
+    /// Which machines subscribe to a key, found once for each.
+    routes: BTreeMap<String, Vec<usize>>,
     /// When the last sample on a way arrives: ways keep their order.
     last_arrival: BTreeMap<(usize, usize), Monotonic>,
     delay: (Duration, Duration),
+    /// The share of samples that the bus drops because somebody does not keep up.
+    sample_loss: f64,
+    facts: Facts,
+    checkers: Vec<Box<dyn Checker>>,
+    violations: Vec<Violation>,
+    trace: Trace,
 }
 
 impl World {
@@ -58,45 +83,80 @@ impl World {
             machines: Vec::new(),
             arrivals: BTreeMap::new(),
             counter: 0,
+            routes: BTreeMap::new(),
             last_arrival: BTreeMap::new(),
             delay,
+            sample_loss: 0.0,
+            facts: Facts::default(),
+            checkers: Vec::new(),
+            violations: Vec::new(),
+            trace: Trace::default(),
         }
     }
 
-    /// Adds a node and starts it; its session opens at once.
+    /// Has a checker watch from now on.
+    pub fn watch(&mut self, checker: Box<dyn Checker>) {
+        self.checkers.push(checker);
+    }
+
+    /// Where services tell facts; it is given to them before they are added.
+    pub fn facts(&self) -> Facts {
+        self.facts.clone()
+    }
+
+    /// Adds a machine without a disk and starts its node; its session opens at once.
     ///
     /// # Errors
     /// Why the configuration cannot be.
     pub fn add(&mut self, config: NodeConfig) -> Result<NodeHandle, String> {
-        let keys = Keys::new(&config.fleet);
-        let decoder = Decoder::new(keys.clone());
-        self.machines.push(Machine {
-            node: Node::new(config)?,
-            keys,
-            decoder,
-            open: false,
-            subscriptions: Vec::new(),
-            publishers: BTreeMap::new(),
-            tokens: BTreeSet::new(),
-            armed: None,
-            sent: Vec::new(),
-            exited: false,
-        });
+        let node = Node::new(config.clone())?;
+        self.machines.push(Machine::new(config, Clocks { born: self.now, ..Clocks::default() }));
         let place = self.machines.len() - 1;
-        self.handle(place, Vec::new());
-        self.open_bus(NodeHandle(place));
+        self.start(place, node);
         Ok(NodeHandle(place))
     }
 
-    /// The time of the world.
+    /// The node of a machine begins a life.
+    fn start(&mut self, place: usize, node: Node) {
+        let machine = &mut self.machines[place];
+        machine.node = Some(node);
+        machine.clocks.born = self.now;
+        let boot = machine.config.boot;
+        self.observe(place, Seen::Started(boot));
+        self.handle(place, Vec::new());
+        self.open_bus(NodeHandle(place));
+    }
+
+    /// Starts the node of a machine with a new boot id.
+    fn start_again(&mut self, place: usize, boot: BootId) {
+        self.machines[place].config.boot = boot;
+        match Node::new(self.machines[place].config.clone()) {
+            Ok(node) => self.start(place, node),
+            Err(why) => self.violate("the world", format!("{}: {why}", NodeHandle(place))),
+        }
+    }
+
+    /// The true time of the world, on clocks that are right.
     pub fn now(&self) -> Now {
-        let wall = Wall(EPOCH + i64::try_from(self.now.elapsed().as_nanos()).unwrap_or(i64::MAX - EPOCH));
-        Now { monotonic: self.now, wall }
+        Clocks::default().at(self.now)
+    }
+
+    /// All machines.
+    pub fn nodes(&self) -> impl Iterator<Item = NodeHandle> + use<> {
+        (0..self.machines.len()).map(NodeHandle)
+    }
+
+    /// Whether a node runs.
+    pub fn is_running(&self, node: NodeHandle) -> bool {
+        self.machines[node.0].node.is_some()
     }
 
     /// A node of the world.
+    ///
+    /// # Panics
+    /// When it does not run.
     pub fn node(&self, of: NodeHandle) -> &Node {
-        &self.machines[of.0].node
+        self.machines[of.0].node.as_ref().expect("the node runs")
     }
 
     /// What a node has written to peers of its bridges since the last time.
@@ -109,31 +169,41 @@ impl World {
         self.machines[node.0].exited
     }
 
-    /// Opens the session of a node: it hears the tokens that are there.
-    pub fn open_bus(&mut self, of: NodeHandle) {
-        self.machines[of.0].open = true;
-        self.handle(of.0, vec![Event::BusOpened]);
-        let others = self.machines.iter().enumerate().filter(|(i, m)| *i != of.0 && m.open);
-        let tokens: Vec<_> = others.flat_map(|(_, m)| m.tokens.iter().copied()).collect();
-        for token in tokens {
-            self.arrive(of.0, of.0, Arrival::Event(Event::Alive(token, true)));
-        }
-        self.arrive(of.0, of.0, Arrival::Event(Event::AliveKnown));
+    /// The keys of a node's fleet.
+    pub fn keys(&self, of: NodeHandle) -> &Keys {
+        &self.machines[of.0].keys
     }
 
-    /// Closes the session of a node: it is silent and deaf until it opens again.
-    pub fn close_bus(&mut self, of: NodeHandle) {
-        self.machines[of.0].open = false;
-        let tokens: Vec<_> = std::mem::take(&mut self.machines[of.0].tokens).into_iter().collect();
-        for token in tokens {
-            self.tell_token(of.0, token, false);
+    /// What must not be and was seen.
+    pub fn violations(&self) -> &[Violation] {
+        &self.violations
+    }
+
+    /// How much has happened, and a hash of all of it.
+    pub fn trace(&self) -> (u64, u64) {
+        (self.trace.count(), self.trace.hash())
+    }
+
+    /// The end of what has happened, for people.
+    pub fn print_trace(&self) -> String {
+        self.trace.print()
+    }
+
+    /// Ends all lives and asks the checkers what is missing.
+    pub fn finish(&mut self) {
+        for place in 0..self.machines.len() {
+            self.end(place);
         }
-        self.handle(of.0, vec![Event::BusClosed("the simulator closed it".into())]);
+        for mut checker in std::mem::take(&mut self.checkers) {
+            for what in checker.finish() {
+                self.violate(checker.name(), what);
+            }
+        }
     }
 
     /// Gives a node an event now.
     pub fn give(&mut self, to: NodeHandle, event: Event) {
-        self.handle(to.0, vec![event]);
+        self.deliver(to.0, event);
     }
 
     /// Gives a node a message from a peer of its first bridge.
@@ -142,11 +212,12 @@ impl World {
         self.give(to, Event::Peer(BridgeId(0), PeerId(peer), message));
     }
 
-    /// Lets time pass.
+    /// Lets time pass; stops early where something is seen that must not be.
     pub fn run_for(&mut self, time: Duration) {
         let end = self.now + time;
         while let Some(first) = self.arrivals.first_entry()
             && first.key().0 <= end
+            && self.violations.is_empty()
         {
             let ((at, _), (place, arrival)) = first.remove_entry();
             self.now = at;
@@ -156,32 +227,58 @@ impl World {
     }
 
     fn take(&mut self, place: usize, arrival: Arrival) {
-        let machine = &mut self.machines[place];
-        let event = match arrival {
-            Arrival::Deadline => {
-                if machine.armed != Some(self.now) {
-                    return;
-                }
-                Event::Deadline
-            }
-            Arrival::Event(event) => event,
-            Arrival::Sample { key, deleted, header, content } => {
-                if !machine.open {
-                    return;
-                }
-                match machine.decoder.decode(&key, deleted, &header, content) {
+        match arrival {
+            Arrival::Deadline => self.take_deadline(place),
+            Arrival::Event(event) => self.deliver(place, event),
+            Arrival::Sample { key, deleted, header, content, .. } => {
+                let event = match self.machines[place].decoder.decode(&key, deleted, &header, content) {
                     Ok(envelope) => Event::Sample(envelope),
                     Err(why) => Event::SampleRefused(why),
-                }
+                };
+                self.deliver(place, event);
             }
-        };
+            Arrival::Disk => self.disk_is_done(place),
+            Arrival::JournalDeadline => self.journal_deadline(place),
+            Arrival::SessionLost => self.session_is_lost(place),
+            Arrival::Tokens => self.tell_tokens(),
+        }
+    }
+
+    fn take_deadline(&mut self, place: usize) {
+        let machine = &mut self.machines[place];
+        let Some(armed) = machine.armed else { return };
+        if machine.clocks.at(self.now).monotonic >= armed {
+            machine.armed = None;
+            self.deliver(place, Event::Deadline);
+        }
+    }
+
+    /// Something reaches a node, which may be stalled.
+    fn deliver(&mut self, place: usize, event: Event) {
+        let machine = &mut self.machines[place];
+        if machine.node.is_none() {
+            return;
+        }
+        if let Some(stalled) = &mut machine.stalled {
+            return stalled.push(event);
+        }
+        match &event {
+            Event::Sample(envelope) => self.observe(place, Seen::Arrived(envelope)),
+            Event::BusOpened => self.observe(place, Seen::BusUp),
+            Event::BusClosed(_) => self.observe(place, Seen::BusDown),
+            _ => {}
+        }
         self.handle(place, vec![event]);
     }
 
     fn handle(&mut self, place: usize, mut events: Vec<Event>) {
-        let now = self.now();
+        let machine = &mut self.machines[place];
+        let Some(node) = &mut machine.node else { return };
         let mut effects = Vec::new();
-        self.machines[place].node.handle(now, &mut events, &mut effects);
+        node.handle(machine.clocks.at(self.now), &mut events, &mut effects);
+        for fact in self.facts.take() {
+            self.observe(place, Seen::Fact(&*fact));
+        }
         for effect in effects {
             self.carry_out(place, effect);
         }
@@ -190,26 +287,11 @@ impl World {
     fn carry_out(&mut self, place: usize, effect: Effect) {
         let machine = &mut self.machines[place];
         match effect {
-            Effect::Subscribe(expressions) => machine.subscriptions = expressions,
-            Effect::Declare { publisher, key, constant, .. } => {
-                machine.publishers.insert(publisher, (key, constant));
-            }
-            Effect::Publish(publisher, envelope) => {
-                let (key, mut header) = machine.publishers[&publisher].clone();
-                encode_variable(&envelope.message, &envelope.stamp, &mut header);
-                self.publish(place, key, header, &envelope);
-            }
-            Effect::PublishOn(key, envelope) => {
-                let mut header = Vec::new();
-                aldis_envelope::codec::native::encode(&envelope, &mut header);
-                self.publish(place, key, header, &envelope);
-            }
-            Effect::Token(source, true) if machine.tokens.insert(source) => {
-                self.tell_token(place, source, true)
-            }
-            Effect::Token(source, false) if machine.tokens.remove(&source) => {
-                self.tell_token(place, source, false)
-            }
+            Effect::Subscribe(..)
+            | Effect::Declare { .. }
+            | Effect::Publish(..)
+            | Effect::PublishOn(..)
+            | Effect::Token(..) => self.carry_out_on_bus(place, effect),
             Effect::Send(bridge, peer, label, content) => machine.sent.push((bridge, peer, label, content)),
             Effect::Job(source, number, job) => {
                 let done = Event::Job(source, number, Ok(job()));
@@ -217,48 +299,47 @@ impl World {
             }
             Effect::Arm(at) => {
                 machine.armed = Some(at);
-                self.counter += 1;
-                self.arrivals.insert((at.max(self.now), self.counter), (place, Arrival::Deadline));
-                machine.armed = Some(at.max(self.now));
+                // A nanosecond is lost in turning one clock into the other.
+                let when = machine.clocks.when(at) + Duration::from_nanos(2);
+                self.put(when.max(self.now), place, Arrival::Deadline);
             }
             Effect::Exit => machine.exited = true,
-            Effect::Token(..) | Effect::PauseInput(_) | Effect::Say(_) => {}
-        }
-    }
-
-    fn publish(&mut self, from: usize, key: String, header: Vec<u8>, envelope: &Envelope) {
-        if !self.machines[from].open {
-            return;
-        }
-        let deleted = envelope.message.change == Change::Dispose;
-        for to in 0..self.machines.len() {
-            let machine = &self.machines[to];
-            if to != from && machine.open && machine.subscriptions.iter().any(|e| meets(e, &key)) {
-                let (key, header, content) = (key.clone(), header.clone(), envelope.message.content.clone());
-                self.arrive(from, to, Arrival::Sample { key, deleted, header, content });
-            }
-        }
-    }
-
-    fn tell_token(&mut self, from: usize, source: Source, alive: bool) {
-        let told: Vec<_> = (0..self.machines.len()).filter(|&i| i != from && self.machines[i].open).collect();
-        for to in told {
-            self.arrive(from, to, Arrival::Event(Event::Alive(source, alive)));
+            Effect::Say(note) => self.observe(place, Seen::Said(&note)),
+            Effect::PauseInput(_) => {}
         }
     }
 
     /// Something arrives after a delay from the seed, in order on its way.
     fn arrive(&mut self, from: usize, to: usize, arrival: Arrival) {
-        let (least, most) = (self.delay.0.as_micros() as u64, self.delay.1.as_micros() as u64);
-        let delay = Duration::from_micros(self.random.u64(least..=most.max(least)));
+        let delay = self.draw(self.delay);
         let way = self.last_arrival.entry((from, to)).or_default();
         *way = (self.now + delay).max(*way);
-        self.counter += 1;
-        self.arrivals.insert((*way, self.counter), (to, arrival));
+        let at = *way;
+        self.put(at, to, arrival);
     }
 
-    /// The keys of a node's fleet.
-    pub fn keys(&self, of: NodeHandle) -> &Keys {
-        &self.machines[of.0].keys
+    fn put(&mut self, at: Monotonic, to: usize, arrival: Arrival) {
+        self.counter += 1;
+        self.arrivals.insert((at, self.counter), (to, arrival));
+    }
+
+    fn draw(&mut self, (least, most): (Duration, Duration)) -> Duration {
+        let (least, most) = (least.as_micros() as u64, most.as_micros() as u64);
+        Duration::from_micros(self.random.u64(least..=most.max(least)))
+    }
+
+    fn observe(&mut self, place: usize, seen: Seen<'_>) {
+        let clocks = self.machines[place].clocks.at(self.now);
+        let observation = Observation { at: self.now, clocks, node: NodeHandle(place), seen };
+        self.trace.record(&observation);
+        for checker in &mut self.checkers {
+            if let Err(what) = checker.observe(&observation) {
+                self.violations.push(Violation { checker: checker.name(), at: self.now, what });
+            }
+        }
+    }
+
+    fn violate(&mut self, checker: &'static str, what: String) {
+        self.violations.push(Violation { checker, at: self.now, what });
     }
 }

@@ -15,7 +15,7 @@ const PACKAGES: [(&str, &[&str]); 3] = [
 /// circle can be.
 const LAYERS: [&[&str]; 8] = [
     &["service"],
-    &["allow", "calls", "counters", "dds", "event", "notes", "streams"],
+    &["allow", "calls", "counters", "dds", "event", "journal", "notes", "streams"],
     &["map", "umaa"],
     &["bridge", "labels"],
     &["conform", "health", "log", "track"],
