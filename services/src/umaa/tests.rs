@@ -3,6 +3,7 @@
 pub(crate) mod asking;
 pub(crate) mod bus;
 pub(crate) mod checker;
+mod nodes;
 mod random;
 pub(crate) mod sea;
 pub(crate) mod vector;

@@ -95,6 +95,7 @@ enum Stage {
 /// Provides one kind of commands. It is a [`Service`](crate::Service); its author gives it an [`Executor`] and, where not
 /// everybody may command it, an [`Admission`].
 pub struct Provider<C: Command, E, A = Everybody> {
+    source: Source,
     guid: Guid,
     guids: Guids,
     settings: ProviderSettings,
@@ -116,6 +117,7 @@ impl<C: Command, E: Executor<C>, A: Admission> Provider<C, E, A> {
     /// A provider that runs as a service with these ids.
     pub fn new(source: Source, guids: Guids, settings: ProviderSettings, executor: E, admission: A) -> Self {
         Self {
+            source,
             guid: guids.of_service(source),
             guids,
             settings,

@@ -17,14 +17,15 @@ use super::{Provider, Stage};
 use crate::service::Outbox;
 use aldis_envelope::umaa::{
     self, Command, CommandAckReport, CommandState, CommandStatus, CommandStatusReason, Key, LongDescription,
-    Topic,
+    SessionKey, Topic,
 };
-use aldis_envelope::{Change, Envelope, Guid, KeyHash, Monotonic, Now, Source};
+use aldis_envelope::{Change, DateTime, Envelope, Guid, KeyHash, Monotonic, Now, Source};
 use std::collections::BTreeMap;
 
 /// What a former life said of one session.
 struct Left<C> {
-    state: Option<CommandState>,
+    /// The last status and when it was made.
+    state: Option<(DateTime, CommandState)>,
     ack: Option<CommandAckReport<C>>,
     execution_status: bool,
     /// Whether the consumer is known to be alive.
@@ -59,27 +60,18 @@ impl<C> Past<C> {
 impl<C: Command, E: Executor<C>, A: Admission> Provider<C, E, A> {
     /// A sample of a former life: told by the own node, or by one that retains it for this one.
     pub(super) fn remember(&mut self, envelope: &Envelope) {
-        if self.stage != Stage::Listening || envelope.message.change != Change::Put {
+        let is_own = envelope.message.label.source() == self.source;
+        if self.stage != Stage::Listening || envelope.message.change != Change::Put || !is_own {
             return;
         }
         let content = &envelope.message.content;
         if is_about::<CommandStatus<C>>(envelope) {
-            let status = umaa::decode::<CommandStatus<C>>(content);
-            if let Ok(status) = status
-                && let Some(left) = self.left_of(status.key())
-            {
-                left.state = Some(status.command_status);
+            if let Ok(status) = umaa::decode(content) {
+                self.remember_status(&status);
             }
         } else if is_about::<CommandAckReport<C>>(envelope) {
-            let ack = umaa::decode::<CommandAckReport<C>>(content);
-            let own = envelope.message.label.source();
-            if let Ok(ack) = ack
-                && let consumer = self.guids.service(ack.command.header().source)
-                && let Some(left) = self.left_of(ack.key())
-            {
-                // Of a consumer on the own entity no token is told; what it retains always is.
-                left.consumer_is_here |= consumer.is_some_and(|consumer| consumer.entity == own.entity);
-                left.ack = Some(ack);
+            if let Ok(ack) = umaa::decode(content) {
+                self.remember_ack(ack);
             }
         } else if is_about::<C::ExecutionStatus>(envelope) {
             let status = umaa::decode::<C::ExecutionStatus>(content);
@@ -91,7 +83,28 @@ impl<C: Command, E: Executor<C>, A: Admission> Provider<C, E, A> {
         }
     }
 
-    fn left_of(&mut self, key: aldis_envelope::umaa::SessionKey) -> Option<&mut Left<C>> {
+    /// A node that retains for this one may be behind: what is older than what is known says nothing.
+    fn remember_status(&mut self, status: &CommandStatus<C>) {
+        if let Some(left) = self.left_of(status.key())
+            && left.state.is_none_or(|(known, _)| status.time_stamp >= known)
+        {
+            left.state = Some((status.time_stamp, status.command_status));
+        }
+    }
+
+    fn remember_ack(&mut self, ack: CommandAckReport<C>) {
+        let consumer = self.guids.service(ack.command.header().source);
+        // Of a consumer on the own entity no token is told; what it retains always is.
+        let is_here = consumer.is_some_and(|consumer| consumer.entity == self.source.entity);
+        if let Some(left) = self.left_of(ack.key())
+            && left.ack.as_ref().is_none_or(|known| ack.time_stamp >= known.time_stamp)
+        {
+            left.consumer_is_here |= is_here;
+            left.ack = Some(ack);
+        }
+    }
+
+    fn left_of(&mut self, key: SessionKey) -> Option<&mut Left<C>> {
         let room = self.past.left.len() < self.most_held() || self.past.left.contains_key(&key.session_id);
         (key.source == self.guid && room).then(|| self.past.left.entry(key.session_id).or_default())
     }
@@ -131,7 +144,7 @@ impl<C: Command, E: Executor<C>, A: Admission> Provider<C, E, A> {
         let Some(left) = self.past.left.remove(&id.session) else { return false };
         let known = left.ack.map(|ack| ack.command).unwrap_or_else(|| command.clone());
         let header = known.header();
-        let Some(state) = left.state.filter(|_| header.source == id.source) else {
+        let Some((_, state)) = left.state.filter(|_| header.source == id.source) else {
             self.dispose_past(id.session, left.execution_status, out);
             return false;
         };
@@ -181,8 +194,8 @@ impl<C: Command, E: Executor<C>, A: Admission> Provider<C, E, A> {
                 let execution_status = left.execution_status;
                 self.past.left.remove(&session);
                 self.dispose_past(session, execution_status, out);
-            } else if all_is_told && left.state.is_some_and(|state| !state.is_terminal()) {
-                left.state = Some(CommandState::Failed);
+            } else if all_is_told && left.state.is_some_and(|(_, state)| !state.is_terminal()) {
+                left.state = Some((now.wall.into(), CommandState::Failed));
                 let text = "its command was gone when its provider started again";
                 self.publish_past(now, session, text, out);
             }

@@ -6,7 +6,7 @@ use crate::umaa::tests::asking::{Asking, Handle, Seen};
 use crate::umaa::tests::bus::{Bus, Factory, guids, source};
 use crate::umaa::tests::vector::{VectorCommand, VectorExecutionStatus, provider, steer};
 
-use aldis_envelope::umaa::CommandStatusReason;
+use aldis_envelope::umaa::{CommandState, CommandStatusReason};
 use std::sync::Arc;
 
 type VectorConsumer = Consumer<VectorCommand>;
@@ -412,4 +412,27 @@ fn a_command_that_cannot_be_read_is_told_and_harms_nothing() {
     sea.bus.put(cut);
     sea.run(1);
     assert!(sea.bus.notes.iter().any(|note| note.contains("is not read")), "{:?}", sea.bus.notes);
+}
+
+#[test]
+fn only_what_this_provider_said_itself_counts_as_its_past() {
+    let mut sea = sea();
+    sea.bus.crash(steersman());
+    let session = sea.order(steer(90.0, 2, ""));
+    // Somebody else says that the command is done.
+    let pirate = source(666, 100);
+    sea.bus.add(pirate, 0, client_of(ConsumerSettings::default(), VectorHandle::default(), pirate));
+    let key = SessionKey { source: guids().of_service(steersman()), session_id: session };
+    let (state, reason) = (CommandState::Completed, CommandStatusReason::Succeeded);
+    let status =
+        CommandStatus::<VectorCommand>::new(DateTime::default(), key, state, reason, Default::default());
+    let label = umaa::label::<CommandStatus<VectorCommand>>(pirate).unwrap();
+    sea.bus.checker = Default::default();
+    sea.bus.put(umaa::put(label, &status));
+    sea.run(1);
+    assert_eq!(sea.told(), "");
+    sea.bus.start(steersman());
+    sea.run(5);
+    assert_eq!(*sea.asked.lock().unwrap(), ["start 90"]);
+    assert_eq!(sea.told(), "ISSUED COMMANDED EXECUTING left:2 Completed");
 }

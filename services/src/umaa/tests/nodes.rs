@@ -1,0 +1,164 @@
+//! The same services in whole nodes of the simulator: an arbiter and its provider on a vehicle, two consumers ashore.
+
+use super::asking::{Asking, Handle, Part, Seen};
+use super::bus::{guids, source};
+use super::sea::{
+    AUTOPILOT, Controlling, arbiter, autopilot, captain, control_told, guid, settings, steersman,
+};
+use super::vector::{provider, steer};
+use crate::event::Event;
+use crate::node::NodeConfig;
+use crate::registry;
+use crate::service::{Action, Input, Outbox, Service, ServiceSpec};
+use crate::sim::{NodeHandle, World};
+use crate::umaa::allocation::{Arbiter, Arbitration, Guard, GuardSettings, Plan};
+use crate::umaa::command::{ConsumerSettings, ProviderSettings};
+use aldis_envelope::{BootId, EntityId, Fleet, Monotonic, Now, Prefix, Source};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Longer than any delay of the simulated bus, which loses nothing: after it every reader has what was sent.
+const DELIVERED: Duration = Duration::from_millis(50);
+
+/// Gives a service what this simulator's bus does not: a history, which is empty at the start of a world, and confirmations,
+/// which are safe once the longest delay has passed.
+struct OnPlainBus {
+    inner: Box<dyn Service>,
+    outbox: Outbox,
+    confirms: Vec<(Monotonic, u64)>,
+}
+
+impl OnPlainBus {
+    fn give(&mut self, now: Now, input: Input<'_>, out: &mut Outbox) {
+        self.inner.handle(now, input, &mut self.outbox);
+        for action in self.outbox.drain() {
+            match action {
+                Action::Send(message) => out.send(message),
+                Action::SendConfirmed(message, number, _) => {
+                    out.send(message);
+                    self.confirms.push((now.monotonic + DELIVERED, number));
+                }
+                Action::Note(note) => out.note(note.level, note.text),
+                _ => panic!("a service of these tests wants something else"),
+            }
+        }
+    }
+}
+
+impl Service for OnPlainBus {
+    fn subscriptions(&self) -> Vec<Prefix> {
+        self.inner.subscriptions()
+    }
+
+    fn follows_bus(&self) -> bool {
+        self.inner.follows_bus()
+    }
+
+    fn handle(&mut self, now: Now, input: Input<'_>, out: &mut Outbox) {
+        let started = matches!(input, Input::Started);
+        self.give(now, input, out);
+        if started {
+            self.give(now, Input::HistoryComplete(true), out);
+        }
+        while let Some(place) = self.confirms.iter().position(|(at, _)| *at <= now.monotonic) {
+            let (_, number) = self.confirms.remove(place);
+            self.give(now, Input::Confirmed(number, Ok(())), out);
+        }
+    }
+
+    fn next_deadline(&self) -> Option<Monotonic> {
+        let confirms = self.confirms.iter().map(|(at, _)| *at);
+        confirms.chain(self.inner.next_deadline()).min()
+    }
+}
+
+fn spec(at: Source, make: impl Fn() -> Box<dyn Service> + Send + Sync + 'static) -> ServiceSpec {
+    let factory = Arc::new(move || -> Box<dyn Service> {
+        Box::new(OnPlainBus { inner: make(), outbox: Outbox::new(at), confirms: Vec::new() })
+    });
+    ServiceSpec { source: at, name: "test".into(), factory }
+}
+
+fn node(entity: EntityId, services: Vec<ServiceSpec>) -> NodeConfig {
+    let mut all = registry::built_in(entity, &guids(), Duration::from_secs(5));
+    all.extend(services);
+    NodeConfig {
+        fleet: Fleet::new("blue").unwrap(),
+        entities: vec![entity],
+        boot: BootId(1),
+        operators: Vec::new(),
+        allow: Vec::new(),
+        import: vec![Prefix::all()],
+        export: vec![Prefix::all()],
+        services: all,
+        bridges: Vec::new(),
+    }
+}
+
+fn shore(world: &mut World, number: u64) -> (NodeHandle, Handle<Controlling>) {
+    let (at, handle) = (captain(number), Handle::<Controlling>::default());
+    let given = handle.clone();
+    let spec = spec(at, move || {
+        let part = Controlling::new(at, guids(), ConsumerSettings::default());
+        Box::new(Asking { part, handle: given.clone() })
+    });
+    (world.add(node(at.entity, vec![spec])).unwrap(), handle)
+}
+
+/// Has a consumer ashore do something, and lets three seconds pass.
+fn order<P: Part>(
+    world: &mut World,
+    (of, at): (NodeHandle, Source),
+    handle: &Handle<P>,
+    wish: impl FnOnce(&mut P, Now, &mut Outbox) + Send + 'static,
+) {
+    handle.wish(wish);
+    // Wakes the service.
+    world.give(of, Event::Job(at, 0, Ok(Box::new(()))));
+    world.run_for(Duration::from_secs(3));
+}
+
+fn plan(course: f64, seconds: u32) -> Plan<super::vector::VectorCommand> {
+    Plan {
+        arbiter: guid(arbiter()),
+        resource: AUTOPILOT,
+        duration: Some(Duration::from_secs(4)),
+        provider: guid(steersman()),
+        command: steer(course, seconds, ""),
+    }
+}
+
+#[test]
+fn consumers_contend_across_nodes() {
+    let mut world = World::new(3, (Duration::from_millis(1), Duration::from_millis(5)));
+    let (one_node, one) = shore(&mut world, 1);
+    let (two_node, two) = shore(&mut world, 2);
+    let asked = Seen::default();
+    let given = asked.clone();
+    let arbitration = Arbitration::new(settings(autopilot())).unwrap();
+    let on_board = vec![
+        spec(arbiter(), move || Box::new(Arbiter::new(arbiter(), &guids(), arbitration.clone()))),
+        spec(steersman(), move || {
+            let guard = Guard::new(steersman(), guids(), GuardSettings::new(AUTOPILOT));
+            provider(steersman(), &guids(), ProviderSettings::default(), guard, given.clone())
+        }),
+    ];
+    let vehicle = world.add(node(source(400, 1).entity, on_board)).unwrap();
+    world.run_for(Duration::from_secs(1));
+    order(&mut world, (one_node, captain(1)), &one, |consumer, now, out| {
+        consumer.start(now, plan(10.0, 60), out).unwrap();
+    });
+    assert_eq!(control_told(one.take()), "allocated ISSUED COMMANDED EXECUTING status");
+    order(&mut world, (two_node, captain(2)), &two, |consumer, now, out| {
+        consumer.start(now, plan(20.0, 2), out).unwrap();
+    });
+    let lost = control_told(one.take());
+    assert!(lost.contains("lost:FAILED/INTERRUPTED") && lost.ends_with("FAILED/INTERRUPTED"), "{lost}");
+    world.run_for(Duration::from_secs(5));
+    assert_eq!(control_told(two.take()), "allocated ISSUED COMMANDED EXECUTING status Completed");
+    assert_eq!(*asked.lock().unwrap(), ["start 10", "stop 10 Broken", "start 20"]);
+    for of in [vehicle, one_node] {
+        let counters = world.node(of).counters();
+        assert_eq!((counters.lost, counters.crashes, counters.refused_headers), (0, 0, 0));
+    }
+}
