@@ -54,7 +54,12 @@ impl Session {
     /// Whether nothing of it is left on the bus.
     pub(super) fn is_over(&self) -> bool {
         let said = self.status_there || self.ack_there || self.execution_status_there;
-        !said && (self.command.is_none() || self.disposed && self.state.as_deref().is_none_or(is_terminal))
+        !said && (self.command.is_none() || self.disposed && self.is_terminal())
+    }
+
+    /// Whether it was cancelled before anything was said of it: its provider may still take it up, or never hear of it.
+    pub(super) fn is_unanswered(&self) -> bool {
+        self.disposed && self.state.is_none()
     }
 
     fn is_terminal(&self) -> bool {

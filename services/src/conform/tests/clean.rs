@@ -123,6 +123,23 @@ fn recovery_and_renewal_are_no_breach() {
 }
 
 #[test]
+fn a_cancel_may_cross_the_first_answer() {
+    let mut scene = Scene::new();
+    scene.vector(ALICE, PILOT, 30);
+    scene.command_change(VECTOR, 30, Observed::Dispose);
+    scene.status(VECTOR, PILOT, 30, "ISSUED", "SUCCEEDED");
+    scene.ack(VECTOR, PILOT, 30);
+    scene.status(VECTOR, PILOT, 30, "COMMANDED", "SUCCEEDED");
+    scene.status(VECTOR, PILOT, 30, "CANCELED", "CANCELED");
+    scene.clear(VECTOR, PILOT, 30);
+    // Or nobody ever takes it up.
+    scene.vector(ALICE, PILOT, 31);
+    scene.command_change(VECTOR, 31, Observed::Dispose);
+    scene.wait(100);
+    assert_eq!(finished(scene), []);
+}
+
+#[test]
 fn history_is_taken_in_without_judging_it() {
     let mut scene = Scene::with_priorities();
     scene.retained = true;
