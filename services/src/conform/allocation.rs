@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 const SERVICE: &str = "UMAA::SO::ResourceAllocation::";
-const ALLOCATION: &str = "UMAA::SO::ResourceAllocation::ResourceAllocation";
+pub(super) const ALLOCATION: &str = "UMAA::SO::ResourceAllocation::ResourceAllocation";
 const PRIORITY: &str = "UMAA::SO::ResourceAllocation::ResourceAllocationPriority";
 
 /// How many services that allocate are followed: a vehicle has one.
@@ -162,6 +162,8 @@ impl Allocations {
             format!("resource {resource} is given to {consumer} when the report names {told:?}")
         });
 
+        // The control that ended goes on with this session.
+        ledger.forgive(&debt(Clause::ReportCleared, resource, consumer));
         let expiry = debt(Clause::Expiry, resource, step.session);
         ledger.forgive(&expiry);
         if let Some(seconds) = command.value()["duration"].as_f64()
@@ -194,6 +196,16 @@ impl Allocations {
             ledger.owe(debt(Clause::ReportCleared, resource, consumer), ledger.bounds.follow, text);
         } else {
             ledger.held(Clause::ReportCleared);
+        }
+    }
+
+    /// The arbiter has disposed what it said of a session, or is gone: it owes no end of that control any longer. A provider
+    /// that starts again clears up without a last word where the command is gone (4.1.5).
+    pub(super) fn forgotten(&mut self, session: Guid, disposed: bool, ledger: &mut Ledger) {
+        let Some(Holder { resource, .. }) = self.executing.get(&session) else { return };
+        ledger.forgive(&debt(Clause::Expiry, *resource, session));
+        if disposed {
+            self.executing.remove(&session);
         }
     }
 
