@@ -5,7 +5,7 @@ use super::command::Step;
 use super::ledger::{Debt, Ledger};
 use super::sample::Sample;
 use super::transition::is_terminal;
-use aldis_envelope::Guid;
+use aldis_envelope::{Guid, Monotonic};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
@@ -29,6 +29,8 @@ struct Holder {
 struct Arbiter {
     /// Every resource, with the consumer in control if there is one.
     holders: BTreeMap<Guid, Option<Guid>>,
+    /// Who was in control of what before, and until when: a provider may not have heard of the change.
+    former: BTreeMap<(Guid, Guid), Monotonic>,
     /// Consumers from low to high.
     priorities: BTreeMap<Guid, Vec<Guid>>,
     /// The providers of a resource.
@@ -41,12 +43,17 @@ pub(super) struct Allocations {
     arbiters: BTreeMap<Guid, Arbiter>,
     /// By session.
     executing: BTreeMap<Guid, Holder>,
-    /// Whom a resource was taken from, since it was last given to somebody.
-    interrupted: BTreeMap<Guid, Guid>,
+    /// Whom a resource was taken from, and the list that was in force, until it is given to somebody or free.
+    interrupted: BTreeMap<Guid, (Guid, Vec<Guid>)>,
 }
 
 fn debt(clause: Clause, resource: Guid, who: Guid) -> Debt {
     (clause, String::new(), resource, who)
+}
+
+/// The place on a list from low to high; none where it is not on it.
+fn rank(list: &[Guid], consumer: Guid) -> Option<usize> {
+    list.iter().position(|listed| *listed == consumer)
 }
 
 impl Allocations {
@@ -86,7 +93,18 @@ impl Allocations {
                 let holder = |entry: &Sample| {
                     entry.value()["controlSession"]["controllingConsumer"].as_str()?.parse().ok()
                 };
-                arbiter.holders = entries.map(|(id, entry)| (id, holder(&entry))).collect();
+                let (now, slack) = (ledger.now(), ledger.bounds.slack);
+                arbiter.former.retain(|_, until| now - *until < slack);
+                let holders: BTreeMap<_, _> = entries.map(|(id, entry)| (id, holder(&entry))).collect();
+                for (resource, before) in std::mem::take(&mut arbiter.holders) {
+                    if let Some(before) =
+                        before.filter(|before| holders.get(&resource) != Some(&Some(*before)))
+                    {
+                        arbiter.former.insert((resource, before), ledger.now());
+                    }
+                }
+                self.interrupted.retain(|resource, _| holders.get(resource) != Some(&None));
+                arbiter.holders = holders;
                 self.control_reported(source, ledger);
             }
         }
@@ -148,12 +166,16 @@ impl Allocations {
 
         let known = self.arbiters.get(&step.provider);
         let list = known.and_then(|arbiter| arbiter.priorities.get(&resource));
-        let rank = |id: Guid| list.and_then(|list| list.iter().position(|listed| *listed == id));
-        ledger.judge(Clause::Listed, rank(consumer).is_some(), || {
+        let list = list.map(Vec::as_slice).unwrap_or_default();
+        ledger.judge(Clause::Listed, rank(list, consumer).is_some(), || {
             format!("resource {resource} is given to {consumer}, which is not on its list")
         });
-        if let Some(loser) = self.interrupted.remove(&resource).filter(|loser| *loser != consumer) {
-            ledger.judge(Clause::TakeOver, rank(consumer) > rank(loser), || {
+        if let Some((loser, then)) =
+            self.interrupted.remove(&resource).filter(|(loser, _)| *loser != consumer)
+        {
+            // A new list may have come in between.
+            let goes_before = |list: &[Guid]| rank(list, consumer) > rank(list, loser);
+            ledger.judge(Clause::TakeOver, goes_before(list) || goes_before(&then), || {
                 format!("resource {resource} is taken from {loser} for {consumer}, which is not of higher priority")
             });
         }
@@ -182,7 +204,8 @@ impl Allocations {
         };
         ledger.pay(&debt(Clause::Expiry, resource, step.session));
         if step.reason == "INTERRUPTED" {
-            self.interrupted.insert(resource, consumer);
+            let list = self.arbiters.get(&arbiter).and_then(|arbiter| arbiter.priorities.get(&resource));
+            self.interrupted.insert(resource, (consumer, list.cloned().unwrap_or_default()));
         }
         let goes_on =
             self.executing.values().any(|other| (other.resource, other.consumer) == (resource, consumer));
@@ -227,7 +250,9 @@ impl Allocations {
         for arbiter in self.arbiters.values() {
             let of_provider = arbiter.sources.iter().filter(|(_, sources)| sources.contains(&step.provider));
             for (resource, sources) in of_provider {
-                let holds = arbiter.holders.get(resource) == Some(&Some(consumer));
+                let crossed = |until: &Monotonic| ledger.now() - *until < ledger.bounds.slack;
+                let holds = arbiter.holders.get(resource) == Some(&Some(consumer))
+                    || arbiter.former.get(&(*resource, consumer)).is_some_and(crossed);
                 ledger.judge(Clause::Guard, holds || sources.contains(&consumer), || {
                     format!(
                         "{} executes a command of {consumer}, which does not control {resource}",

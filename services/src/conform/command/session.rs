@@ -179,7 +179,8 @@ impl Session {
         let (to, reason) =
             (sample.text("commandStatus")?.to_owned(), sample.text("commandStatusReason")?.to_owned());
         // The same sample again, after a restart of who carries it, is no new status.
-        if self.last_status.as_ref() == Some(sample) && self.status_there {
+        if self.last_status.as_ref() == Some(sample) {
+            (self.status_there, self.provider_gone) = (true, false);
             return None;
         }
         self.last_status = Some(sample.clone());

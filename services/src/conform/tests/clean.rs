@@ -116,6 +116,7 @@ fn recovery_and_renewal_are_no_breach() {
     let key = json!({ "source": id(PILOT), "sessionID": id(30) });
     scene.observe(&format!("{VECTOR}CommandStatus"), &key, Observed::NoWriters);
     scene.wait(60);
+    scene.status_again(VECTOR);
     scene.status(VECTOR, PILOT, 30, "ISSUED", "UPDATED");
     scene.ack(VECTOR, PILOT, 30);
     scene.status(VECTOR, PILOT, 30, "COMMANDED", "SUCCEEDED");
