@@ -151,6 +151,12 @@ impl Monitor {
     fn change(&mut self, change: &Observed, id: &InstanceId, topic: &str, sample: &Sample) {
         let ledger = &mut self.ledger;
         if let Some(part) = command::part_of(topic) {
+            if part.family == allocation::ALLOCATION
+                && part.role == command::Role::Status
+                && let Some(session) = sample.guid("sessionID")
+            {
+                self.allocations.forgotten(session, *change == Observed::Dispose, ledger);
+            }
             match change {
                 Observed::Dispose => self.commands.disposed(&part, sample, ledger),
                 Observed::Unregister => self.commands.unregistered(&part, sample, ledger),

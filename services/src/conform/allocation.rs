@@ -5,12 +5,12 @@ use super::command::Step;
 use super::ledger::{Debt, Ledger};
 use super::sample::Sample;
 use super::transition::is_terminal;
-use aldis_envelope::Guid;
+use aldis_envelope::{Guid, Monotonic};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 const SERVICE: &str = "UMAA::SO::ResourceAllocation::";
-const ALLOCATION: &str = "UMAA::SO::ResourceAllocation::ResourceAllocation";
+pub(super) const ALLOCATION: &str = "UMAA::SO::ResourceAllocation::ResourceAllocation";
 const PRIORITY: &str = "UMAA::SO::ResourceAllocation::ResourceAllocationPriority";
 
 /// How many services that allocate are followed: a vehicle has one.
@@ -29,6 +29,8 @@ struct Holder {
 struct Arbiter {
     /// Every resource, with the consumer in control if there is one.
     holders: BTreeMap<Guid, Option<Guid>>,
+    /// Who was in control of what before, and until when: a provider may not have heard of the change.
+    former: BTreeMap<(Guid, Guid), Monotonic>,
     /// Consumers from low to high.
     priorities: BTreeMap<Guid, Vec<Guid>>,
     /// The providers of a resource.
@@ -41,12 +43,17 @@ pub(super) struct Allocations {
     arbiters: BTreeMap<Guid, Arbiter>,
     /// By session.
     executing: BTreeMap<Guid, Holder>,
-    /// Whom a resource was taken from, since it was last given to somebody.
-    interrupted: BTreeMap<Guid, Guid>,
+    /// Whom a resource was taken from, and the list that was in force, until it is given to somebody or free.
+    interrupted: BTreeMap<Guid, (Guid, Vec<Guid>)>,
 }
 
 fn debt(clause: Clause, resource: Guid, who: Guid) -> Debt {
     (clause, String::new(), resource, who)
+}
+
+/// The place on a list from low to high; none where it is not on it.
+fn rank(list: &[Guid], consumer: Guid) -> Option<usize> {
+    list.iter().position(|listed| *listed == consumer)
 }
 
 impl Allocations {
@@ -86,7 +93,18 @@ impl Allocations {
                 let holder = |entry: &Sample| {
                     entry.value()["controlSession"]["controllingConsumer"].as_str()?.parse().ok()
                 };
-                arbiter.holders = entries.map(|(id, entry)| (id, holder(&entry))).collect();
+                let (now, slack) = (ledger.now(), ledger.bounds.slack);
+                arbiter.former.retain(|_, until| now - *until < slack);
+                let holders: BTreeMap<_, _> = entries.map(|(id, entry)| (id, holder(&entry))).collect();
+                for (resource, before) in std::mem::take(&mut arbiter.holders) {
+                    if let Some(before) =
+                        before.filter(|before| holders.get(&resource) != Some(&Some(*before)))
+                    {
+                        arbiter.former.insert((resource, before), ledger.now());
+                    }
+                }
+                self.interrupted.retain(|resource, _| holders.get(resource) != Some(&None));
+                arbiter.holders = holders;
                 self.control_reported(source, ledger);
             }
         }
@@ -148,12 +166,16 @@ impl Allocations {
 
         let known = self.arbiters.get(&step.provider);
         let list = known.and_then(|arbiter| arbiter.priorities.get(&resource));
-        let rank = |id: Guid| list.and_then(|list| list.iter().position(|listed| *listed == id));
-        ledger.judge(Clause::Listed, rank(consumer).is_some(), || {
+        let list = list.map(Vec::as_slice).unwrap_or_default();
+        ledger.judge(Clause::Listed, rank(list, consumer).is_some(), || {
             format!("resource {resource} is given to {consumer}, which is not on its list")
         });
-        if let Some(loser) = self.interrupted.remove(&resource).filter(|loser| *loser != consumer) {
-            ledger.judge(Clause::TakeOver, rank(consumer) > rank(loser), || {
+        if let Some((loser, then)) =
+            self.interrupted.remove(&resource).filter(|(loser, _)| *loser != consumer)
+        {
+            // A new list may have come in between.
+            let goes_before = |list: &[Guid]| rank(list, consumer) > rank(list, loser);
+            ledger.judge(Clause::TakeOver, goes_before(list) || goes_before(&then), || {
                 format!("resource {resource} is taken from {loser} for {consumer}, which is not of higher priority")
             });
         }
@@ -162,6 +184,8 @@ impl Allocations {
             format!("resource {resource} is given to {consumer} when the report names {told:?}")
         });
 
+        // The control that ended goes on with this session.
+        ledger.forgive(&debt(Clause::ReportCleared, resource, consumer));
         let expiry = debt(Clause::Expiry, resource, step.session);
         ledger.forgive(&expiry);
         if let Some(seconds) = command.value()["duration"].as_f64()
@@ -180,7 +204,8 @@ impl Allocations {
         };
         ledger.pay(&debt(Clause::Expiry, resource, step.session));
         if step.reason == "INTERRUPTED" {
-            self.interrupted.insert(resource, consumer);
+            let list = self.arbiters.get(&arbiter).and_then(|arbiter| arbiter.priorities.get(&resource));
+            self.interrupted.insert(resource, (consumer, list.cloned().unwrap_or_default()));
         }
         let goes_on =
             self.executing.values().any(|other| (other.resource, other.consumer) == (resource, consumer));
@@ -194,6 +219,16 @@ impl Allocations {
             ledger.owe(debt(Clause::ReportCleared, resource, consumer), ledger.bounds.follow, text);
         } else {
             ledger.held(Clause::ReportCleared);
+        }
+    }
+
+    /// The arbiter has disposed what it said of a session, or is gone: it owes no end of that control any longer. A provider
+    /// that starts again clears up without a last word where the command is gone (4.1.5).
+    pub(super) fn forgotten(&mut self, session: Guid, disposed: bool, ledger: &mut Ledger) {
+        let Some(Holder { resource, .. }) = self.executing.get(&session) else { return };
+        ledger.forgive(&debt(Clause::Expiry, *resource, session));
+        if disposed {
+            self.executing.remove(&session);
         }
     }
 
@@ -215,7 +250,9 @@ impl Allocations {
         for arbiter in self.arbiters.values() {
             let of_provider = arbiter.sources.iter().filter(|(_, sources)| sources.contains(&step.provider));
             for (resource, sources) in of_provider {
-                let holds = arbiter.holders.get(resource) == Some(&Some(consumer));
+                let crossed = |until: &Monotonic| ledger.now() - *until < ledger.bounds.slack;
+                let holds = arbiter.holders.get(resource) == Some(&Some(consumer))
+                    || arbiter.former.get(&(*resource, consumer)).is_some_and(crossed);
                 ledger.judge(Clause::Guard, holds || sources.contains(&consumer), || {
                     format!(
                         "{} executes a command of {consumer}, which does not control {resource}",

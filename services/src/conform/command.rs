@@ -5,9 +5,9 @@ mod session;
 use super::ledger::Ledger;
 use super::sample::Sample;
 use super::{Clause, FOLLOWED_MAX};
-use aldis_envelope::Guid;
+use aldis_envelope::{Guid, Monotonic};
 use session::Session;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// What a topic is in a command's family.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,11 +57,13 @@ type SessionId = (String, Guid, Guid);
 pub(super) struct Commands {
     execution_statuses: BTreeSet<String>,
     sessions: BTreeMap<SessionId, Session>,
+    /// Sessions that were cancelled before they were answered, and when to forget them.
+    unanswered: VecDeque<(Monotonic, SessionId)>,
 }
 
 impl Commands {
     pub(super) fn new(execution_statuses: BTreeSet<String>) -> Self {
-        Self { execution_statuses, sessions: BTreeMap::new() }
+        Self { execution_statuses, sessions: BTreeMap::new(), unanswered: VecDeque::new() }
     }
 
     /// A sample of a command or about one. What the command did by it.
@@ -72,6 +74,7 @@ impl Commands {
         retained: bool,
         ledger: &mut Ledger,
     ) -> Option<Step> {
+        self.forget(ledger.now());
         let session_id = sample.guid("sessionID")?;
         let source = sample.guid("source")?;
         let provider = if part.role == Role::Command { sample.guid("destination")? } else { source };
@@ -98,6 +101,16 @@ impl Commands {
             Role::Status => return session.status(sample, retained, ledger),
         }
         None
+    }
+
+    /// Forgets what nobody has answered in time.
+    fn forget(&mut self, now: Monotonic) {
+        while self.unanswered.front().is_some_and(|(due, _)| *due < now) {
+            let Some((_, id)) = self.unanswered.pop_front() else { return };
+            if self.sessions.get(&id).is_some_and(Session::is_unanswered) {
+                self.sessions.remove(&id);
+            }
+        }
     }
 
     /// The active commands of a family with that session: provider and consumer.
@@ -136,7 +149,13 @@ impl Commands {
 
     /// An instance of a command or about one is disposed.
     pub(super) fn disposed(&mut self, part: &Part, key: &Sample, ledger: &mut Ledger) {
+        let due = ledger.now() + ledger.bounds.answer + ledger.bounds.slack;
         self.with(part, key, |session| session.disposed(part.role, ledger));
+        if let Some(id) = id_of(part, key)
+            && self.sessions.get(&id).is_some_and(Session::is_unanswered)
+        {
+            self.unanswered.push_back((due, id));
+        }
     }
 
     /// Its writer has unregistered.
@@ -158,11 +177,7 @@ impl Commands {
 
     /// Whether the command is known.
     fn with(&mut self, part: &Part, key: &Sample, act: impl FnOnce(&mut Session)) -> bool {
-        let provider = if part.role == Role::Command { "destination" } else { "source" };
-        let (Some(provider), Some(session)) = (key.guid(provider), key.guid("sessionID")) else {
-            return false;
-        };
-        let id = (part.family.clone(), session, provider);
+        let Some(id) = id_of(part, key) else { return false };
         let Some(known) = self.sessions.get_mut(&id) else { return false };
         act(known);
         if known.is_over() {
@@ -170,4 +185,9 @@ impl Commands {
         }
         true
     }
+}
+
+fn id_of(part: &Part, key: &Sample) -> Option<SessionId> {
+    let provider = if part.role == Role::Command { "destination" } else { "source" };
+    Some((part.family.clone(), key.guid("sessionID")?, key.guid(provider)?))
 }

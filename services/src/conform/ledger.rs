@@ -68,6 +68,10 @@ impl Ledger {
         self.topic.replace_range(.., topic);
     }
 
+    pub(super) fn now(&self) -> Monotonic {
+        self.now
+    }
+
     /// There is too much to follow this too.
     pub(super) fn unfollowed(&mut self) {
         self.unfollowed += 1;

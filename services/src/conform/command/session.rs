@@ -5,7 +5,7 @@ use crate::conform::Clause;
 use crate::conform::ledger::{Debt, Ledger};
 use crate::conform::sample::Sample;
 use crate::conform::transition::{is_legal, is_reason, is_terminal};
-use aldis_envelope::Guid;
+use aldis_envelope::{Guid, Monotonic};
 
 /// What is known of a command.
 #[derive(Debug)]
@@ -21,8 +21,12 @@ pub(super) struct Session {
     /// An update is on the bus that has not been answered.
     updated: bool,
     state: Option<String>,
+    /// When it came to a terminal state.
+    ended: Option<Monotonic>,
     last_status: Option<Sample>,
     acknowledged: bool,
+    /// Who spoke about the command has unregistered, or contact is lost: its next life may go on, or begin anew.
+    provider_gone: bool,
     status_there: bool,
     ack_there: bool,
     execution_status_there: bool,
@@ -38,8 +42,10 @@ impl Session {
             disposed: false,
             updated: false,
             state: None,
+            ended: None,
             last_status: None,
             acknowledged: false,
+            provider_gone: false,
             status_there: false,
             ack_there: false,
             execution_status_there: false,
@@ -54,7 +60,12 @@ impl Session {
     /// Whether nothing of it is left on the bus.
     pub(super) fn is_over(&self) -> bool {
         let said = self.status_there || self.ack_there || self.execution_status_there;
-        !said && (self.command.is_none() || self.disposed && self.state.as_deref().is_none_or(is_terminal))
+        !said && (self.command.is_none() || self.disposed && self.is_terminal())
+    }
+
+    /// Whether it was cancelled before anything was said of it: its provider may still take it up, or never hear of it.
+    pub(super) fn is_unanswered(&self) -> bool {
+        self.disposed && self.state.is_none()
     }
 
     fn is_terminal(&self) -> bool {
@@ -96,10 +107,12 @@ impl Session {
         if !newer {
             return;
         }
-        let (in_time, state) = (!self.is_terminal(), self.state.clone().unwrap_or_default());
+        let state = self.state.clone().unwrap_or_default();
+        // The end may have crossed the update.
+        let in_time = self.ended.is_none_or(|ended| ledger.now() - ended <= ledger.bounds.slack);
         self.judge(Clause::UpdateInTime, in_time, ledger, || format!("updated when it was {state}"));
         self.before = self.command.replace(sample.clone());
-        if in_time {
+        if self.ended.is_none() {
             (self.updated, self.acknowledged) = (true, false);
             self.owe(Clause::UpdateAnswered, ledger, "its update is not answered");
         }
@@ -111,7 +124,7 @@ impl Session {
         self.command = Some(sample.clone());
         (self.before, self.disposed, self.updated) = (None, false, false);
         if reused {
-            (self.state, self.acknowledged) = (None, false);
+            (self.state, self.ended, self.acknowledged) = (None, None, false);
             for clause in [Clause::ProviderCleanUp, Clause::CancelAnswered] {
                 ledger.forgive(&self.debt(clause));
             }
@@ -166,16 +179,23 @@ impl Session {
         let (to, reason) =
             (sample.text("commandStatus")?.to_owned(), sample.text("commandStatusReason")?.to_owned());
         // The same sample again, after a restart of who carries it, is no new status.
-        if self.last_status.as_ref() == Some(sample) && self.status_there {
+        if self.last_status.as_ref() == Some(sample) {
+            (self.status_there, self.provider_gone) = (true, false);
             return None;
         }
         self.last_status = Some(sample.clone());
         self.status_there = true;
         self.correlate(retained, "a status", ledger);
+        if std::mem::take(&mut self.provider_gone)
+            && (to.as_str(), reason.as_str()) == ("ISSUED", "SUCCEEDED")
+        {
+            (self.state, self.acknowledged) = (None, false);
+        }
         if !retained {
             self.transition(&to, &reason, ledger);
         }
         self.state = Some(to.clone());
+        self.ended = is_terminal(&to).then_some(ledger.now());
         self.after(&to, retained, ledger);
         let (family, session, provider) = self.id.clone();
         Some(Step { family, provider, session, command: self.command.clone(), to, reason })
@@ -248,11 +268,7 @@ impl Session {
             self.command_disposed(ledger);
             return;
         }
-        match role {
-            Role::Ack => self.ack_there = false,
-            Role::ExecutionStatus => self.execution_status_there = false,
-            _ => self.status_there = false,
-        }
+        self.no_longer_there(role);
         if self.command.is_some() && !self.disposed {
             self.owe(Clause::CleanUpOrder, ledger, "what was said of it is disposed before its command");
         } else {
@@ -260,6 +276,15 @@ impl Session {
         }
         if !self.status_there && !self.ack_there && !self.execution_status_there {
             ledger.pay(&self.debt(Clause::ProviderCleanUp));
+        }
+    }
+
+    fn no_longer_there(&mut self, role: Role) {
+        match role {
+            Role::Command => {}
+            Role::Status => self.status_there = false,
+            Role::Ack => self.ack_there = false,
+            Role::ExecutionStatus => self.execution_status_there = false,
         }
     }
 
@@ -277,7 +302,7 @@ impl Session {
         let there = self.status_there || self.ack_there || self.execution_status_there;
         if self.is_terminal() && there {
             self.owe(Clause::ProviderCleanUp, ledger, "what was said of it is not disposed");
-        } else if self.state.is_some() && !self.is_terminal() {
+        } else if self.state.is_some() && !self.is_terminal() && !self.provider_gone {
             self.owe(Clause::CancelAnswered, ledger, "it was cancelled, and has not ended");
         }
     }
@@ -314,6 +339,8 @@ impl Session {
             Clause::ExecutionStatus,
         ];
         let clauses = if role == Role::Command { &consumer[..] } else { &provider[..] };
+        self.provider_gone |= role == Role::Status;
+        self.no_longer_there(role);
         for clause in clauses {
             ledger.forgive(&self.debt(*clause));
         }

@@ -116,9 +116,58 @@ fn recovery_and_renewal_are_no_breach() {
     let key = json!({ "source": id(PILOT), "sessionID": id(30) });
     scene.observe(&format!("{VECTOR}CommandStatus"), &key, Observed::NoWriters);
     scene.wait(60);
+    scene.status_again(VECTOR);
     scene.status(VECTOR, PILOT, 30, "ISSUED", "UPDATED");
     scene.ack(VECTOR, PILOT, 30);
     scene.status(VECTOR, PILOT, 30, "COMMANDED", "SUCCEEDED");
+    // It shuts down in order, and its next life finds the command without a status.
+    scene.status(VECTOR, PILOT, 30, "FAILED", "SERVICE_FAILED");
+    scene.observe(&format!("{VECTOR}CommandStatus"), &key, Observed::Unregister);
+    scene.execute(VECTOR, PILOT, 30);
+    assert_eq!(finished(scene), []);
+}
+
+#[test]
+fn a_second_session_of_the_holder_takes_over_from_the_first() {
+    let mut scene = Scene::with_priorities();
+    scene.give(ALICE, 21, None);
+    scene.allocate(ALICE, 22, None);
+    scene.accept(ALLOCATION, ARBITER, 22);
+    scene.status(ALLOCATION, ARBITER, 21, "COMPLETED", "SUCCEEDED");
+    scene.status(ALLOCATION, ARBITER, 22, "EXECUTING", "SUCCEEDED");
+    scene.clean_up(ALLOCATION, ARBITER, 21);
+    scene.wait(100);
+    assert_eq!(finished(scene), []);
+}
+
+#[test]
+fn an_arbiter_that_starts_again_clears_up_without_a_last_word() {
+    let mut scene = Scene::with_priorities();
+    scene.give(ALICE, 21, Some(3.0));
+    let key = json!({ "source": id(ARBITER), "sessionID": id(21) });
+    scene.observe(&format!("{ALLOCATION}CommandStatus"), &key, Observed::NoWriters);
+    scene.command_change(ALLOCATION, 21, Observed::Dispose);
+    scene.clear(ALLOCATION, ARBITER, 21);
+    scene.control(None);
+    scene.give(BOB, 22, None);
+    scene.wait(100);
+    assert_eq!(finished(scene), []);
+}
+
+#[test]
+fn a_cancel_may_cross_the_first_answer() {
+    let mut scene = Scene::new();
+    scene.vector(ALICE, PILOT, 30);
+    scene.command_change(VECTOR, 30, Observed::Dispose);
+    scene.status(VECTOR, PILOT, 30, "ISSUED", "SUCCEEDED");
+    scene.ack(VECTOR, PILOT, 30);
+    scene.status(VECTOR, PILOT, 30, "COMMANDED", "SUCCEEDED");
+    scene.status(VECTOR, PILOT, 30, "CANCELED", "CANCELED");
+    scene.clear(VECTOR, PILOT, 30);
+    // Or nobody ever takes it up.
+    scene.vector(ALICE, PILOT, 31);
+    scene.command_change(VECTOR, 31, Observed::Dispose);
+    scene.wait(100);
     assert_eq!(finished(scene), []);
 }
 

@@ -35,6 +35,7 @@ pub(super) struct Scene {
     /// The latest timestamp given.
     seconds: i64,
     commands: BTreeMap<(String, u8), Value>,
+    last_status: Value,
     pub(super) retained: bool,
 }
 
@@ -46,7 +47,14 @@ pub(super) fn finished(scene: Scene) -> Vec<Clause> {
 impl Scene {
     pub(super) fn new() -> Self {
         let monitor = Monitor::new(Bounds::default(), [format!("{VECTOR}ExecutionStatusReport")]);
-        Self { monitor, now: Duration::ZERO, seconds: 0, commands: BTreeMap::new(), retained: false }
+        Self {
+            monitor,
+            now: Duration::ZERO,
+            seconds: 0,
+            commands: BTreeMap::new(),
+            last_status: Value::Null,
+            retained: false,
+        }
     }
 
     /// The same scene with other bounds.
@@ -146,7 +154,13 @@ impl Scene {
             "timeStamp": time, "source": id(provider), "sessionID": id(session),
             "commandStatus": state, "commandStatusReason": reason, "logMessage": "",
         });
+        self.last_status = value.clone();
         self.put(&format!("{family}CommandStatus"), value);
+    }
+
+    /// The latest status comes once more, as it was.
+    pub(super) fn status_again(&mut self, family: &str) {
+        self.put(&format!("{family}CommandStatus"), self.last_status.clone());
     }
 
     pub(super) fn ack(&mut self, family: &str, provider: u8, session: u8) {
