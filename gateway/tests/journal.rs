@@ -19,7 +19,7 @@ fn killed(directory: &Path, groups: usize) -> u64 {
     // What it said before its end counts too; the last line may be cut.
     let rest: Vec<String> = said.map_while(Result::ok).collect();
     writer.wait().expect("it ends");
-    let whole = rest.iter().rev().skip(1).next().unwrap_or(&last);
+    let whole = rest.iter().rev().nth(1).unwrap_or(&last);
     whole.parse().expect("a number")
 }
 

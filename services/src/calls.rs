@@ -42,6 +42,11 @@ impl Alive {
         self.services.range(Source::new(entity, first)..).copied().take_while(move |s| s.entity == entity)
     }
 
+    /// Every service that is alive.
+    pub fn all(&self) -> impl Iterator<Item = Source> + '_ {
+        self.services.iter().copied()
+    }
+
     /// The nodes that are alive, by their entities.
     pub fn nodes(&self) -> impl Iterator<Item = EntityId> + '_ {
         self.services.iter().filter(|s| s.service == ServiceId::NODE).map(|s| s.entity)

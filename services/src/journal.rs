@@ -42,7 +42,7 @@ use aldis_envelope::Monotonic;
 use clean::Cleaning;
 use commit::{Group, Queue};
 use disk::Desk;
-use index::Index;
+use index::{Index, SEGMENTS_MAX};
 use read_back::ReadBack;
 use recover::Recovery;
 use std::collections::VecDeque;
@@ -60,7 +60,7 @@ pub struct JournalConfig {
     pub seed: u64,
     /// The most bytes that records may take together, keys included. On disk it may be up to twice as much and two segments.
     pub limit_bytes: u64,
-    /// The size at which a segment is closed and the next begun.
+    /// The size at which a segment is closed and the next begun; raised where there would be more segments than can be.
     pub segment_bytes: u32,
     /// The most bytes that may wait to be written. Beyond it batches are refused: the disk does not keep up.
     pub pending_bytes_max: usize,
@@ -72,7 +72,15 @@ impl JournalConfig {
         Self { seed, limit_bytes: 1 << 30, segment_bytes: 16 << 20, pending_bytes_max: 8 << 20 }
     }
 
-    /// The most bytes on disk: beyond them nothing is appended but forgets, until cleaning has caught up.
+    /// With segments so large that a full journal has a quarter of those that can be.
+    fn with_segments_in_bounds(self) -> Self {
+        let least = self.disk_bytes_max() / (SEGMENTS_MAX as u64 / 4);
+        let segment_bytes = self.segment_bytes.max(u32::try_from(least).unwrap_or(u32::MAX / 2));
+        Self { segment_bytes, ..self }
+    }
+
+    /// The most bytes on disk: beyond them nothing is appended but forgets, and beyond twice as many not even those, until
+    /// cleaning has caught up.
     fn disk_bytes_max(&self) -> u64 {
         self.limit_bytes.saturating_mul(2).saturating_add(2 * u64::from(self.segment_bytes))
     }
@@ -159,7 +167,7 @@ impl Journal {
     pub fn new(config: JournalConfig) -> Self {
         let salt = config.seed;
         Self {
-            config,
+            config: config.with_segments_in_bounds(),
             state: State::New,
             desk: Desk::default(),
             index: Index::default(),
@@ -273,7 +281,7 @@ impl Journal {
             return Err(Refused::Limit { held: would_hold, limit });
         }
         let (disk_bytes, max) = (held.disk_bytes, self.config.disk_bytes_max());
-        if growth > 0 && disk_bytes > max {
+        if growth > 0 && disk_bytes > max || disk_bytes > 2 * max {
             return Err(Refused::Crowded { disk_bytes, max });
         }
         Ok(growth)

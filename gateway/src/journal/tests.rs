@@ -69,6 +69,7 @@ fn records_outlive_the_process_and_segments_are_cleaned() {
     let config = JournalConfig { segment_bytes: 1 << 16, ..JournalConfig::new(seed()) };
     let mut opened = open(&directory, config.clone());
     assert_eq!((opened.recovered.start, opened.records.len()), (1, 0));
+    let identity = opened.recovered.identity;
     let last = (0..10_000).map(|n| opened.thread.append(put(n % 100, 200)).unwrap()).last().unwrap();
     written(&opened, last);
     drop(opened);
@@ -76,7 +77,10 @@ fn records_outlive_the_process_and_segments_are_cleaned() {
         std::fs::read_dir(&directory.0).unwrap().map(|file| file.unwrap().metadata().unwrap().len()).sum();
     assert!(bytes < 20 << 16, "{bytes} bytes for 100 records");
     let opened = open(&directory, config);
-    assert_eq!(opened.recovered, Recovered { start: 2, is_kept: true, records: 100, damage: vec![] });
+    assert_eq!(
+        opened.recovered,
+        Recovered { start: 2, is_kept: true, identity, records: 100, damage: vec![] }
+    );
     assert_eq!(opened.records[&99_u32.to_be_bytes().to_vec()], vec![99; 200]);
 }
 

@@ -116,6 +116,8 @@ pub struct Recovered {
     /// Whether the number of this start and all that was told are on disk for sure. If not, the disk cannot be written; they
     /// are with [`JournalEvent::Resumed`], and until then another start may have the same number.
     pub is_kept: bool,
+    /// Drawn when the journal was begun: another one in its place has another.
+    pub identity: u64,
     /// How many records stand.
     pub records: u64,
     /// What could not be read, and where.

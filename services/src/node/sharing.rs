@@ -75,7 +75,7 @@ pub(super) fn is_among_nodes(label: &Label) -> bool {
 }
 
 impl Node {
-    /// A service has started: it gets what is kept of what it reads, and waits for what others retain.
+    /// A service has started: it hears who is alive, gets what is kept of what it reads, and waits for what others retain.
     pub(super) fn catch_up(&mut self, now: Now, place: usize, effects: &mut Vec<Effect>) {
         let own = self.services[place].spec.source;
         let hosted = &self.services[place];
@@ -93,6 +93,12 @@ impl Node {
             if wanted(&address) {
                 kept.extend(history.samples().cloned());
             }
+        }
+        if hosted.follows_bus() && self.alive.is_known() {
+            for source in self.alive.all().collect::<Vec<_>>() {
+                self.run(now, place, Input::Token(source, true), effects);
+            }
+            self.run(now, place, Input::Bus(true), effects);
         }
         for envelope in &kept {
             self.run(now, place, Input::Message(envelope), effects);

@@ -64,11 +64,11 @@ enum Target {
 /// What is wrong on purpose, to see that it is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Planted {
-    /// An echo answers twice, once in a hundred times.
+    /// An echo answers twice, once in twenty times.
     AnswersTwice,
-    /// A ticker leaves out a number, once in a hundred times.
+    /// A ticker leaves out a number, once in twenty times.
     SkipsTick,
-    /// The call of a caller is forgotten, once in a hundred times.
+    /// The call of a caller is forgotten, once in twenty times.
     ForgetsEnd,
 }
 

@@ -40,7 +40,8 @@ impl Journal {
             self.mends.push_back(DiskOperation::Sync { file, is_new: true });
         }
         let damage = recovery.damage();
-        self.opening = Some(Recovered { start: self.start, damage, ..Recovered::default() });
+        self.opening =
+            Some(Recovered { start: self.start, identity: self.salt, damage, ..Recovered::default() });
         self.state = State::Ready;
         self.next(out);
     }

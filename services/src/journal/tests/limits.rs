@@ -173,3 +173,11 @@ fn cleaning_keeps_the_files_small_and_moves_little_at_a_time() {
     assert_eq!(rig.journal.held().records, 0);
     assert_eq!(rig.restart().1.len(), 0);
 }
+
+#[test]
+fn a_large_journal_has_large_segments() {
+    let of = |limit_bytes| Journal::new(JournalConfig { limit_bytes, ..JournalConfig::new(1) }).config;
+    assert_eq!(of(1 << 30).segment_bytes, 16 << 20);
+    let large = of(1 << 36);
+    assert!(large.disk_bytes_max() / u64::from(large.segment_bytes) <= 1100, "{large:?}");
+}

@@ -41,7 +41,7 @@ impl Ticker {
     fn tick(&mut self, now: Now, out: &mut Outbox) {
         let life = *self.life.get_or_insert(now.wall);
         self.number += 1;
-        if self.planted == Some(Planted::SkipsTick) && self.number.is_multiple_of(100) {
+        if self.planted == Some(Planted::SkipsTick) && self.number.is_multiple_of(20) {
             self.number += 1;
         }
         let content = [life.0.to_le_bytes(), (self.number as i64).to_le_bytes()].concat();
@@ -101,7 +101,7 @@ impl Service for Echo {
     fn handle(&mut self, _: Now, input: Input<'_>, out: &mut Outbox) {
         let (Input::Message(request), Ok(name)) = (input, Name::new("sim.Echoed")) else { return };
         self.answered += 1;
-        let twice = self.planted == Some(Planted::AnswersTwice) && self.answered.is_multiple_of(100);
+        let twice = self.planted == Some(Planted::AnswersTwice) && self.answered.is_multiple_of(20);
         if twice {
             out.reply(request, ContentType::Aldis, name.clone(), request.message.content.clone(), false);
         }
@@ -164,7 +164,7 @@ impl Caller {
 
     fn end(&mut self, id: CallId, outcome: Result<(), aldis_envelope::Refusal>) {
         self.ended += 1;
-        if self.planted != Some(Planted::ForgetsEnd) || !self.ended.is_multiple_of(100) {
+        if self.planted != Some(Planted::ForgetsEnd) || !self.ended.is_multiple_of(20) {
             self.facts.tell(ChatterFact::CallEnds { caller: self.source, id, outcome });
         }
     }

@@ -9,74 +9,16 @@ use super::vector::{provider, steer};
 use crate::event::Event;
 use crate::node::NodeConfig;
 use crate::registry;
-use crate::service::{Action, Input, Outbox, Service, ServiceSpec};
+use crate::service::{Outbox, Service, ServiceSpec};
 use crate::sim::{NodeHandle, World};
 use crate::umaa::allocation::{Arbiter, Arbitration, Guard, GuardSettings, Plan};
 use crate::umaa::command::{ConsumerSettings, ProviderSettings};
-use aldis_envelope::{BootId, EntityId, Fleet, Monotonic, Now, Prefix, Source};
+use aldis_envelope::{BootId, EntityId, Fleet, Now, Prefix, Source};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Longer than any delay of the simulated bus, which loses nothing: after it every reader has what was sent.
-const DELIVERED: Duration = Duration::from_millis(50);
-
-/// Gives a service what this simulator's bus does not: a history, which is empty at the start of a world, and confirmations,
-/// which are safe once the longest delay has passed.
-struct OnPlainBus {
-    inner: Box<dyn Service>,
-    outbox: Outbox,
-    confirms: Vec<(Monotonic, u64)>,
-}
-
-impl OnPlainBus {
-    fn give(&mut self, now: Now, input: Input<'_>, out: &mut Outbox) {
-        self.inner.handle(now, input, &mut self.outbox);
-        for action in self.outbox.drain() {
-            match action {
-                Action::Send(message) => out.send(message),
-                Action::SendConfirmed(message, number, _) => {
-                    out.send(message);
-                    self.confirms.push((now.monotonic + DELIVERED, number));
-                }
-                Action::Note(note) => out.note(note.level, note.text),
-                _ => panic!("a service of these tests wants something else"),
-            }
-        }
-    }
-}
-
-impl Service for OnPlainBus {
-    fn subscriptions(&self) -> Vec<Prefix> {
-        self.inner.subscriptions()
-    }
-
-    fn follows_bus(&self) -> bool {
-        self.inner.follows_bus()
-    }
-
-    fn handle(&mut self, now: Now, input: Input<'_>, out: &mut Outbox) {
-        let started = matches!(input, Input::Started);
-        self.give(now, input, out);
-        if started {
-            self.give(now, Input::HistoryComplete(true), out);
-        }
-        while let Some(place) = self.confirms.iter().position(|(at, _)| *at <= now.monotonic) {
-            let (_, number) = self.confirms.remove(place);
-            self.give(now, Input::Confirmed(number, Ok(())), out);
-        }
-    }
-
-    fn next_deadline(&self) -> Option<Monotonic> {
-        let confirms = self.confirms.iter().map(|(at, _)| *at);
-        confirms.chain(self.inner.next_deadline()).min()
-    }
-}
-
 fn spec(at: Source, make: impl Fn() -> Box<dyn Service> + Send + Sync + 'static) -> ServiceSpec {
-    let factory = Arc::new(move || -> Box<dyn Service> {
-        Box::new(OnPlainBus { inner: make(), outbox: Outbox::new(at), confirms: Vec::new() })
-    });
-    ServiceSpec { source: at, name: "test".into(), factory }
+    ServiceSpec { source: at, name: "test".into(), factory: Arc::new(make) }
 }
 
 fn node(entity: EntityId, services: Vec<ServiceSpec>) -> NodeConfig {
@@ -86,6 +28,8 @@ fn node(entity: EntityId, services: Vec<ServiceSpec>) -> NodeConfig {
         fleet: Fleet::new("blue").unwrap(),
         entities: vec![entity],
         boot: BootId(1),
+        topics: Vec::new(),
+        reliable: true,
         operators: Vec::new(),
         allow: Vec::new(),
         import: vec![Prefix::all()],
