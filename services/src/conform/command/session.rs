@@ -6,6 +6,10 @@ use crate::conform::ledger::{Debt, Ledger};
 use crate::conform::sample::Sample;
 use crate::conform::transition::{is_legal, is_reason, is_terminal};
 use aldis_envelope::{Guid, Monotonic};
+use std::collections::VecDeque;
+
+/// How many earlier forms of a command are remembered.
+const BEFORE_MAX: usize = 16;
 
 /// What is known of a command.
 #[derive(Debug)]
@@ -14,12 +18,12 @@ pub(super) struct Session {
     /// Whether an execution status is defined for the command.
     has_execution_status: bool,
     command: Option<Sample>,
-    /// The command before its latest update: an acknowledgement may have crossed it.
-    before: Option<Sample>,
+    /// The command before its latest updates: acknowledgements may have crossed them.
+    before: VecDeque<Sample>,
     /// The consumer has disposed the command.
     disposed: bool,
-    /// An update is on the bus that has not been answered.
-    updated: bool,
+    /// How many updates are on the bus that have not been answered.
+    updates: u32,
     state: Option<String>,
     /// When it came to a terminal state.
     ended: Option<Monotonic>,
@@ -38,9 +42,9 @@ impl Session {
             id,
             has_execution_status,
             command: None,
-            before: None,
+            before: VecDeque::new(),
             disposed: false,
-            updated: false,
+            updates: 0,
             state: None,
             ended: None,
             last_status: None,
@@ -111,9 +115,12 @@ impl Session {
         // The end may have crossed the update.
         let in_time = self.ended.is_none_or(|ended| ledger.now() - ended <= ledger.bounds.slack);
         self.judge(Clause::UpdateInTime, in_time, ledger, || format!("updated when it was {state}"));
-        self.before = self.command.replace(sample.clone());
+        self.before.extend(self.command.replace(sample.clone()));
+        if self.before.len() > BEFORE_MAX {
+            self.before.pop_front();
+        }
         if self.ended.is_none() {
-            (self.updated, self.acknowledged) = (true, false);
+            (self.updates, self.acknowledged) = (self.updates + 1, false);
             self.owe(Clause::UpdateAnswered, ledger, "its update is not answered");
         }
     }
@@ -122,7 +129,8 @@ impl Session {
     fn begin(&mut self, sample: &Sample, retained: bool, ledger: &mut Ledger) {
         let reused = self.disposed;
         self.command = Some(sample.clone());
-        (self.before, self.disposed, self.updated) = (None, false, false);
+        (self.disposed, self.updates) = (false, 0);
+        self.before.clear();
         if reused {
             (self.state, self.ended, self.acknowledged) = (None, None, false);
             for clause in [Clause::ProviderCleanUp, Clause::CancelAnswered] {
@@ -141,8 +149,11 @@ impl Session {
         let acknowledged = Sample::new(sample.value()["command"].clone());
         let is_now = self.command.as_ref() == Some(&acknowledged);
         self.acknowledged |= is_now || retained;
+        if is_now {
+            self.updates = 0;
+        }
         if self.command.is_some() {
-            let matches = is_now || self.before.as_ref() == Some(&acknowledged);
+            let matches = is_now || self.before.contains(&acknowledged);
             self.judge(Clause::AckMatches, matches, ledger, || {
                 format!("it acknowledges {}", acknowledged.value())
             });
@@ -156,7 +167,7 @@ impl Session {
         if retained {
             return;
         }
-        let executing = self.state.as_deref() == Some("EXECUTING") || self.updated;
+        let executing = self.state.as_deref() == Some("EXECUTING") || self.updates > 0;
         let state = self.state.clone().unwrap_or_else(|| "not answered".to_owned());
         if executing {
             ledger.pay(&self.debt(Clause::ExecutionStatus));
@@ -218,11 +229,11 @@ impl Session {
             });
         }
         if legal && from.is_some() && to == "ISSUED" {
-            self.judge(Clause::UpdatedOnly, self.updated, ledger, || {
+            self.judge(Clause::UpdatedOnly, self.updates > 0, ledger, || {
                 "back to ISSUED without an update".to_owned()
             });
         }
-        if to == "COMMANDED" && legal && !self.updated {
+        if to == "COMMANDED" && legal && self.updates == 0 {
             self.judge(Clause::AckFirst, self.acknowledged, ledger, || {
                 "COMMANDED before it is acknowledged".to_owned()
             });
@@ -241,7 +252,7 @@ impl Session {
         ledger.pay(&self.debt(Clause::Answered));
         if to == "ISSUED" || is_terminal(to) {
             ledger.pay(&self.debt(Clause::UpdateAnswered));
-            self.updated = false;
+            self.updates = if to == "ISSUED" { self.updates.saturating_sub(1) } else { 0 };
         }
         if to == "EXECUTING" && self.has_execution_status && !retained {
             self.owe(Clause::ExecutionStatus, ledger, "no execution status while EXECUTING");

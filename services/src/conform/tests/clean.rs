@@ -155,6 +155,22 @@ fn an_arbiter_that_starts_again_clears_up_without_a_last_word() {
 }
 
 #[test]
+fn two_updates_may_come_before_the_answer_to_the_first() {
+    let mut scene = Scene::new();
+    scene.vector(ALICE, PILOT, 30);
+    scene.execute(VECTOR, PILOT, 30);
+    scene.vector(ALICE, PILOT, 30);
+    let first = scene.command_now(VECTOR, 30);
+    scene.vector(ALICE, PILOT, 30);
+    scene.status(VECTOR, PILOT, 30, "ISSUED", "UPDATED");
+    scene.ack_of(VECTOR, PILOT, 30, first);
+    scene.status(VECTOR, PILOT, 30, "ISSUED", "UPDATED");
+    scene.ack(VECTOR, PILOT, 30);
+    scene.status(VECTOR, PILOT, 30, "COMMANDED", "SUCCEEDED");
+    assert_eq!(finished(scene), []);
+}
+
+#[test]
 fn a_cancel_may_cross_the_first_answer() {
     let mut scene = Scene::new();
     scene.vector(ALICE, PILOT, 30);

@@ -134,6 +134,10 @@ impl Scene {
         self.put(&format!("{family}Command"), value);
     }
 
+    pub(super) fn command_now(&self, family: &str, session: u8) -> Value {
+        self.commands[&(family.to_owned(), session)].clone()
+    }
+
     pub(super) fn allocate(&mut self, consumer: u8, session: u8, duration: Option<f64>) {
         let own = json!({ "duration": duration, "resourceID": id(AUTOPILOT) });
         self.command(ALLOCATION, consumer, ARBITER, session, own);
