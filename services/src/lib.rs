@@ -11,6 +11,7 @@ pub mod event;
 pub mod health;
 mod host;
 mod labels;
+pub mod link;
 pub mod log;
 pub mod map;
 pub mod node;
