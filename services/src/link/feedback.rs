@@ -139,9 +139,10 @@ impl Link {
             self.tell(left.entry.ticket, TicketState::Expired { tries: left.tries }, effects);
         }
         self.states.tick(now.monotonic);
+        let idle = !self.is_due(now.monotonic);
         for index in 0..self.paths.len() {
             let path = &mut self.paths[index];
-            let timeout = path.timeout(path.config.mtu);
+            let timeout = path.overdue_after(idle);
             for frame in path.sent.overdue(now.monotonic, timeout) {
                 self.on_lost(now.monotonic, frame, false);
             }

@@ -17,6 +17,8 @@ pub(super) struct Head {
     pub(super) key: bool,
     /// The sender wants to hear of it.
     pub(super) eliciting: bool,
+    /// The sender wants a hello that names its life.
+    pub(super) asks: bool,
     /// A byte that two lives of a sender that follow one another never share.
     pub(super) session: u8,
     /// The lowest bits of the number on this carrier.
@@ -25,20 +27,22 @@ pub(super) struct Head {
 
 impl Head {
     pub(super) fn write(self, out: &mut Vec<u8>) {
-        let flags = u8::from(self.hello) << 4 | u8::from(self.key) << 3 | u8::from(self.eliciting) << 2;
+        let flags = u8::from(self.hello) << 4 | u8::from(self.key) << 3;
+        let flags = flags | u8::from(self.eliciting) << 2 | u8::from(self.asks) << 1;
         out.extend_from_slice(&[VERSION << 5 | flags, self.session]);
         out.extend_from_slice(&self.number.to_be_bytes());
     }
 
     pub(super) fn read(reader: &mut Reader<'_>) -> Result<Self, Malformed> {
         let first = reader.byte()?;
-        if first & 3 != 0 {
+        if first & 1 != 0 {
             return Err(reader.malformed());
         }
         Ok(Self {
             hello: first & 0x10 != 0,
             key: first & 8 != 0,
             eliciting: first & 4 != 0,
+            asks: first & 2 != 0,
             session: reader.byte()?,
             number: reader.u16()?,
         })

@@ -2,7 +2,7 @@
 
 use super::body::Origin;
 use super::names::Names;
-use super::state::{DigestParts, SHORT_NUMBERS, SHORT_TIME_US};
+use super::state::{DigestParts, SHORT_NUMBERS, SHORT_TIME_US, SHORT_TIMES};
 use super::wire::{Malformed, Reader};
 use std::collections::BTreeMap;
 
@@ -57,13 +57,14 @@ impl Held {
                 continue;
             }
             number = number.wrapping_add(step);
-            let time = reader.u16()?;
+            let tail = reader.u16()?;
+            let (low, time) = (low | u64::from(tail >> 14) * 32, i64::from(tail) % SHORT_TIMES);
             let whole = u32::try_from(number).map_err(|_| bad)?;
             let (entry, held) = names.instances.get(&whole).zip(self.marks.get(&whole)).ok_or(bad)?;
             let bytes = reader.take(entry.usual as usize)?;
             let sequence = held.sequence.saturating_add(low.wrapping_sub(held.sequence) % SHORT_NUMBERS);
             let units = held.time.div_euclid(SHORT_TIME_US);
-            let units = units.saturating_add(i64::from(time.wrapping_sub(units as u16)));
+            let units = units.saturating_add((time - units).rem_euclid(SHORT_TIMES));
             let time = units.saturating_mul(SHORT_TIME_US);
             samples.push(Short { number: whole, origin: held.origin, sequence, time, bytes });
         }

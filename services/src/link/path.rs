@@ -3,6 +3,7 @@
 use super::received::Received;
 use super::sent::Sent;
 use aldis_envelope::Monotonic;
+use std::collections::VecDeque;
 use std::time::Duration;
 
 /// A carrier, by the number that both ends configure for it.
@@ -30,11 +31,20 @@ pub const MTU_MIN: usize = 128;
 /// How long a carrier may be silent before another is preferred, at least. Shorter and a few lost frames move the traffic.
 const SILENT_AFTER: Duration = Duration::from_secs(3);
 
+/// Frames closer together than this count as one: what loses one may lose the other.
+const APART: Duration = Duration::from_millis(100);
+
 /// How surely a peer that is there is heard within the silence that counts as gone: at 30 % loss about one false alarm in ten hours.
 const UNHEARD: f64 = 4e-5;
 
 /// Silence after which the peer counts as gone.
 pub const GONE_AFTER: Duration = Duration::from_secs(10);
+
+/// About the bytes of a frame with an acknowledgement alone.
+const ACK_BYTES: usize = 10;
+
+/// How long an acknowledgement waits for a second frame, at most.
+pub(super) const ACK_DELAY: Duration = Duration::from_millis(100);
 
 /// The state of a carrier.
 #[derive(Debug)]
@@ -54,6 +64,8 @@ pub(super) struct Path {
     told_loss: (u8, Monotonic),
     smoothed: Duration,
     variation: Duration,
+    /// When the last frames went out, those close together as one.
+    recent: VecDeque<Monotonic>,
     /// How long the peer takes to make a command safe.
     delay: Duration,
     measured: bool,
@@ -78,7 +90,6 @@ impl Path {
             smoothed: config.round_trip,
             variation: config.round_trip / 8,
             loss_out: config.loss,
-            config,
             up: false,
             free: true,
             next_send: Monotonic::START,
@@ -87,9 +98,11 @@ impl Path {
             sent: Sent::default(),
             received: Received::default(),
             acks: Acks::default(),
-            told_loss: (0, Monotonic::START),
+            told_loss: ((config.loss * 255.0) as u8, Monotonic::START),
+            recent: VecDeque::new(),
             delay: Duration::ZERO,
             measured: false,
+            config,
         }
     }
 
@@ -103,6 +116,12 @@ impl Path {
     pub(super) fn pay(&mut self, now: Monotonic, bytes: usize) {
         self.next_send = self.next_send.max(now) + self.airtime(bytes);
         self.last_sent = now;
+        if self.recent.back().is_none_or(|last| now - *last >= APART) {
+            self.recent.push_back(now);
+        }
+        while self.recent.len() > self.frames_wanted() {
+            self.recent.pop_front();
+        }
     }
 
     /// An acknowledgement of the newest frame came.
@@ -126,8 +145,8 @@ impl Path {
 
     /// How long to wait for the acknowledgement of a frame.
     pub(super) fn timeout(&self, bytes: usize) -> Duration {
-        // 3 ms: a shell's timer and a journal are no quicker.
-        let slack = (self.variation * 3).max(Duration::from_millis(3));
+        // 3 ms: a shell's timer and a journal are no quicker. The second copy of an acknowledgement takes its time too.
+        let slack = (self.variation * 3).max(Duration::from_millis(3) + self.airtime(2 * ACK_BYTES));
         self.smoothed + self.airtime(bytes) + self.delay + slack
     }
 
@@ -147,12 +166,23 @@ impl Path {
         self.up && self.free && self.next_send <= now
     }
 
-    /// How often something must be sent so that the peer does not take this end for gone.
-    pub(super) fn keep_alive(&self) -> Duration {
-        // The measured loss errs by a few hundredths; two frames in ten seconds are the least.
+    /// How many frames must go out in the time that counts as silence, so that the peer does not take this end for gone.
+    fn frames_wanted(&self) -> usize {
+        // The measured loss errs by a few hundredths.
         let loss = (self.loss_out + 0.03).clamp(0.02, 0.8);
-        let frames = (UNHEARD.ln() / loss.ln()).ceil().max(3.0);
-        GONE_AFTER.mul_f64(0.95 / frames)
+        (UNHEARD.ln() / loss.ln()).ceil().max(3.0) as usize
+    }
+
+    /// When something must go out so that the peer does not take this end for gone.
+    pub(super) fn keep_alive_at(&self) -> Monotonic {
+        let frames = self.frames_wanted();
+        let within = GONE_AFTER.mul_f64(0.95);
+        let pause = within / frames as u32;
+        let even = self.last_sent + pause;
+        // What went out anyway counts; but nobody is to be silent for long.
+        let enough = self.recent.len() >= frames;
+        let counted = self.recent.front().filter(|_| enough).map_or(even, |first| *first + within);
+        counted.clamp(even, even + pause)
     }
 
     /// How many copies of an acknowledgement go out, by the loss on the way to the peer.
@@ -169,11 +199,19 @@ impl Path {
         let loss = (self.received.loss() * 255.0) as u8;
         let (told, at) = self.told_loss;
         let news = loss.abs_diff(told) >= 12 && now - at >= Duration::from_secs(1);
-        let long_ago = (loss != 0 || told != 0) && now - at >= Duration::from_secs(8);
+        let long_ago = (loss != 0 || told != 0) && now - at >= Duration::from_secs(10);
         (news || long_ago).then(|| {
             self.told_loss = (loss, now);
             loss
         })
+    }
+
+    /// When a frame that nothing was heard of counts as lost, though no later one arrived: its acknowledgement may wait for a
+    /// second frame.
+    pub(super) fn overdue_after(&self, idle: bool) -> Duration {
+        // While nothing else goes out, nothing is to be gained by waiting for later frames to tell.
+        let frames = if idle { 1 } else { 3 };
+        self.timeout(self.config.mtu * frames) + ACK_DELAY
     }
 
     /// A frame came that is to be acknowledged at `due`.
@@ -221,8 +259,10 @@ mod tests {
     #[test]
     fn the_worse_the_link_the_more_often_one_speaks() {
         let mut path = path();
-        let at_30_percent = path.keep_alive();
+        let at_30_percent = path.keep_alive_at();
         path.loss_out = 0.0;
-        assert!(path.keep_alive() > at_30_percent * 2 && path.keep_alive() < GONE_AFTER / 3);
+        let without_loss = path.keep_alive_at();
+        assert!(without_loss.elapsed() > at_30_percent.elapsed() * 2);
+        assert!(without_loss.elapsed() < GONE_AFTER / 3);
     }
 }

@@ -6,7 +6,7 @@ use super::inbox::Took;
 use super::journal::{AfterWrite, name_key};
 use super::names::{Definition, name_of};
 use super::outbox::LIFESPAN_UNIT;
-use super::path::CarrierId;
+use super::path::{ACK_DELAY, CarrierId};
 use super::record::Kind;
 use super::seal::{FrameId, LinkKey, open};
 use super::session::Greeting;
@@ -64,6 +64,7 @@ impl Link {
         if opened.head.eliciting {
             path.acks.newest = now.monotonic;
         }
+        self.session.hello_due |= opened.head.asks;
         // With keys, what is not meant for this life may be a replay; its hello alone counts.
         let unknown = opened.hello.is_some_and(|hello| hello.known_boot != self.boot.0);
         if greeting == Greeting::OldEar || (unknown && !self.config.keys.is_empty()) {
@@ -326,9 +327,11 @@ impl Link {
             path.received.acknowledge(number);
             path.acks.taken += 1;
             // Every second frame is acknowledged at once; one alone soon after.
-            let delay = (path.round_trip() / 6).min(Duration::from_millis(100));
-            path.owe(if path.acks.taken >= 2 { now } else { now + delay });
-            path.acks.copies = path.acks.copies.max(1);
+            let delay = (path.round_trip() / 6).min(ACK_DELAY);
+            let more = path.acks.taken >= 2;
+            path.owe(if more { now } else { now + delay });
+            // One that no further frame comes after is worth its copies.
+            path.acks.copies = if more { 1 } else { path.ack_copies() };
         }
     }
 

@@ -5,8 +5,8 @@ use super::frame::{ACK_BYTES_MAX, Item};
 /// How many numbers below the highest are remembered. A frame that comes later than that counts as a replay.
 const WINDOW: u64 = 128;
 
-/// The weight of one frame in the measured loss: about the last 50 frames count.
-const LOSS_WEIGHT: f64 = 0.02;
+/// The weight of one frame in the measured loss: about the last 100 frames count. More weight, and chance looks like change.
+const LOSS_WEIGHT: f64 = 0.01;
 
 /// What was received on one carrier in the peer's present life.
 #[derive(Debug, Clone, Default)]
@@ -105,7 +105,7 @@ mod tests {
         assert!(received.see(received.whole(40)));
         assert_eq!(received.loss(), 0.0);
         assert!(received.see(received.whole(43)));
-        assert!(received.loss() > 0.03 && received.loss() < 0.05);
+        assert!(received.loss() > 0.015 && received.loss() < 0.025);
     }
 
     #[test]

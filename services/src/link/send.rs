@@ -12,10 +12,10 @@ use fill::Load;
 use std::time::Duration;
 
 /// While nobody is heard and something waits, a frame goes out so often, at least twice a second.
-const PROBE_EVERY: Duration = Duration::from_millis(200);
+const PROBE_EVERY: Duration = Duration::from_millis(100);
 
 /// Of the frames that look for the peer, every so many says hello, in case the peer does not know this place.
-const HELLO_EVERY: u32 = 4;
+const HELLO_EVERY: u32 = 10;
 
 /// How soon something is tried again that could not go.
 const STUCK: Duration = Duration::from_millis(20);
@@ -74,13 +74,13 @@ impl Link {
         let ask = probe && !data;
         let hello = self.session.hello_due || self.session.hello_again().is_some_and(|at| at <= now);
         let acks = path.acks.copies > 0 && path.acks.due.is_some_and(|due| due <= now);
-        let alive = path.last_sent + path.keep_alive() <= now;
+        let alive = path.keep_alive_at() <= now;
         let must = hello || acks || alive || ask;
         (must || data).then_some(Reasons { data, probing, must, ask })
     }
 
     /// Whether data is to go out on a carrier that is heard.
-    fn is_due(&self, now: Monotonic) -> bool {
+    pub(super) fn is_due(&self, now: Monotonic) -> bool {
         self.outbox.is_due(now)
             || self.states.is_due()
             || self.next_void().is_some()
@@ -120,7 +120,7 @@ impl Link {
         let reasons = self.reasons(now.monotonic, index)?;
         let number = self.paths[index].sent.next;
         let looks = reasons.probing && reasons.ask && self.probes.is_multiple_of(HELLO_EVERY);
-        let says_hello = !self.session.confirmed || self.session.hello_due || looks;
+        let says_hello = self.session.asks() || self.session.hello_due || looks;
         let hello = says_hello.then(|| self.hello(number));
         let mut clear = Vec::with_capacity(self.paths[index].config.mtu);
         let key = self.key_out().cloned();
@@ -128,6 +128,7 @@ impl Link {
             hello: says_hello,
             key: key.as_ref().is_some_and(|key| key.number & 1 == 1),
             eliciting: reasons.ask,
+            asks: self.session.asks(),
             session: session_byte(self.boot.0),
             number: number as u16,
         };
@@ -147,7 +148,7 @@ impl Link {
         if empty && !reasons.must {
             return None;
         }
-        if says_hello && !self.session.confirmed {
+        if self.session.asks() {
             load.carried.push(Carried::Hello);
         }
         head.eliciting = reasons.ask || !load.carried.is_empty();
@@ -193,9 +194,10 @@ impl Link {
         at(self.outbox.next_expiry());
         at(self.states.deadline());
         at(self.silence_deadline());
+        let idle = !self.is_due(now);
         for index in 0..self.paths.len() {
             let path = &self.paths[index];
-            at(path.sent.oldest().map(|oldest| oldest + path.timeout(path.config.mtu)));
+            at(path.sent.oldest().map(|oldest| oldest + path.overdue_after(idle)));
             at(path.heard_until().filter(|until| *until > now));
             if path.up && path.free && !self.silent {
                 let wish = self.next_wish(now, index).max(path.next_send);
@@ -213,7 +215,7 @@ impl Link {
     /// When something is to go out on a carrier.
     fn next_wish(&self, now: Monotonic, index: usize) -> Monotonic {
         let path = &self.paths[index];
-        let mut wish = path.last_sent + path.keep_alive();
+        let mut wish = path.keep_alive_at();
         let mut at = |moment: Option<Monotonic>| wish = moment.map_or(wish, |moment| moment.min(wish));
         at(path.acks.due.filter(|_| path.acks.copies > 0));
         at(self.session.hello_due.then_some(now));

@@ -45,9 +45,14 @@ pub(super) struct Session {
 }
 
 impl Session {
+    /// Whether the peer is to say hello: it is not known to know this life.
+    pub(super) fn asks(&self) -> bool {
+        !self.confirmed || !self.echoed
+    }
+
     /// When an unanswered hello goes out again.
     pub(super) fn hello_again(&self) -> Option<Monotonic> {
-        (!self.confirmed).then(|| self.hello_at + HELLO_AGAIN)
+        self.asks().then(|| self.hello_at + HELLO_AGAIN)
     }
 }
 

@@ -8,14 +8,17 @@ use bytes::Bytes;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-/// Times in short form count in units of 1/64 s.
-pub(super) const SHORT_TIME_US: i64 = 15_625;
+/// Times in short form count in units of 1/16 s.
+pub(super) const SHORT_TIME_US: i64 = 62_500;
 
 /// A sample goes in short form only when it is older than this, so that the unit is at most 0.4 % of its age.
-const SHORT_AGE: Duration = Duration::from_secs(4);
+const SHORT_AGE: Duration = Duration::from_secs(16);
 
 /// Numbers in short form are told modulo this.
-pub(super) const SHORT_NUMBERS: u64 = 32;
+pub(super) const SHORT_NUMBERS: u64 = 128;
+
+/// Times in short form are told modulo so many units: 1 024 s.
+pub(super) const SHORT_TIMES: i64 = 1 << 14;
 
 /// The newest sample of an instance.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -217,7 +220,7 @@ impl States {
         let numbers = sample.sequence.checked_sub(held.sequence).filter(|n| *n < SHORT_NUMBERS);
         let units = sample.time.div_euclid(SHORT_TIME_US);
         let passed = units.checked_sub(held.time.div_euclid(SHORT_TIME_US));
-        if !plain || numbers.is_none() || !passed.is_some_and(|passed| (0..65_536).contains(&passed)) {
+        if !plain || numbers.is_none() || !passed.is_some_and(|passed| (0..SHORT_TIMES).contains(&passed)) {
             return None;
         }
         let mut out = Vec::with_capacity(3 + sample.content.len());
@@ -237,9 +240,11 @@ impl States {
             }
         }
         if let Some(last) = out.last_mut() {
-            *last |= (sample.sequence % SHORT_NUMBERS) as u8;
+            *last |= (sample.sequence % 32) as u8;
         }
-        out.extend_from_slice(&(units as u16).to_be_bytes());
+        let high = (sample.sequence / 32 % 4) as u16;
+        let time = units.rem_euclid(SHORT_TIMES) as u16;
+        out.extend_from_slice(&(high << 14 | time).to_be_bytes());
         out.extend_from_slice(&sample.content);
         Some(out)
     }

@@ -57,7 +57,14 @@ fn a_command_costs_few_bytes() {
 
 #[test]
 fn heads_and_hellos_come_back() {
-    let head = Head { hello: true, key: false, eliciting: true, session: session_byte(300), number: 0xfffe };
+    let head = Head {
+        hello: true,
+        key: false,
+        eliciting: true,
+        asks: true,
+        session: session_byte(300),
+        number: 0xfffe,
+    };
     let hello = Hello {
         sender: 400,
         receiver: 1,

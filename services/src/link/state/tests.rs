@@ -87,7 +87,7 @@ fn digests_tell_what_differs() {
 proptest! {
     #[test]
     fn the_short_form_says_what_the_long_one_does(
-        steps in prop::collection::btree_map(0u32..900, (1u64..31, 0i64..60_000 * SHORT_TIME_US), 1..30),
+        steps in prop::collection::btree_map(0u32..900, (1u64..127, 0i64..16_000 * SHORT_TIME_US), 1..30),
         held_sequence in 1u64..100_000,
         held_time in -1_000_000_000_000i64..2_000_000_000_000_000,
     ) {
@@ -104,7 +104,7 @@ proptest! {
         }
         let (mut block, mut before) = (Vec::new(), None);
         for &number in steps.keys() {
-            block.extend(states.short(number, &entry(), before, at(10)).unwrap());
+            block.extend(states.short(number, &entry(), before, at(20)).unwrap());
             before = Some(number);
         }
         let read = held.read_short(&names, &block).unwrap();
