@@ -63,7 +63,8 @@ impl Received {
     }
 
     /// The bits of an acknowledgement, and the highest number in it.
-    pub(super) fn acknowledgement(&self) -> Option<(u16, Vec<u8>)> {
+    /// At most so many bytes of bits: what is older was told before.
+    pub(super) fn acknowledgement(&self, most: usize) -> Option<(u16, Vec<u8>)> {
         let skip = self.safe.trailing_zeros();
         if skip >= 128 {
             return None;
@@ -71,7 +72,7 @@ impl Received {
         let largest = (self.next - 1 - u64::from(skip)) as u16;
         let before = (self.safe >> skip) >> 1;
         let bytes = before.to_le_bytes();
-        let length = bytes.iter().take(ACK_BYTES_MAX).rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
+        let length = bytes.iter().take(most.min(ACK_BYTES_MAX)).rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
         Some((largest, bytes[..length].to_vec()))
     }
 
@@ -131,7 +132,7 @@ mod tests {
                     safe.insert(number);
                 }
             }
-            let told = received.acknowledgement().map(|(largest, before)| {
+            let told = received.acknowledgement(8).map(|(largest, before)| {
                 acknowledged(&Item::Ack { largest, delay: 0, before: &before }, 60)
             });
             let told: BTreeSet<_> = told.unwrap_or_default().into_iter().collect();

@@ -4,9 +4,9 @@ use aldis_envelope::Monotonic;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// A later frame that was acknowledged shows an earlier one to be lost when it is so many numbers later. Two, so that neighbours
-/// that change places are not sent twice.
-const OVERTAKEN: u64 = 2;
+/// A later frame that was acknowledged shows an earlier one to be lost when it is so many numbers later, on a carrier on which
+/// frames were seen to change places. On others the next one does.
+const OVERTAKEN: u64 = 4;
 
 /// How many frames that are taken for lost are remembered: their acknowledgement may still come and is worth knowing.
 const LOST_MAX: usize = 512;
@@ -62,6 +62,8 @@ pub(super) struct Sent {
     pub(super) next: u64,
     waiting: BTreeMap<u64, SentFrame>,
     lost: BTreeMap<u64, SentFrame>,
+    /// A frame taken for lost arrived: frames change places here.
+    reorders: bool,
 }
 
 impl Sent {
@@ -82,11 +84,12 @@ impl Sent {
                 }
                 outcome.arrived.push(frame);
             } else if let Some(frame) = self.lost.remove(number) {
+                self.reorders = true;
                 outcome.arrived.push(frame);
             }
         }
         if let Some(largest) = numbers.first() {
-            let limit = largest.saturating_sub(OVERTAKEN - 1);
+            let limit = largest.saturating_sub(if self.reorders { OVERTAKEN - 1 } else { 0 });
             while let Some(first) = self.waiting.first_entry().filter(|first| *first.key() < limit) {
                 let (number, frame) = first.remove_entry();
                 outcome.lost.push(self.give_up(number, frame));
@@ -143,7 +146,7 @@ mod tests {
     fn what_is_overtaken_is_lost_and_may_still_arrive() {
         let mut sent = sent(5);
         let outcome = sent.acknowledge(&[3]);
-        assert_eq!((outcome.arrived.len(), outcome.lost.len()), (1, 2));
+        assert_eq!((outcome.arrived.len(), outcome.lost.len()), (1, 3));
         assert_eq!(outcome.newest, Some((Monotonic::since_start(Duration::from_secs(3)), 10)));
         let late = sent.acknowledge(&[3, 0]);
         assert_eq!((late.arrived.len(), late.lost.len(), late.newest), (1, 0, None));
