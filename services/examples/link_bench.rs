@@ -1,6 +1,8 @@
 //! Measures the lossy link against its table of goals, in virtual time:
 //! `cargo run --release -p aldis-services --example link_bench -- L1 0.1 G1 G2`.
 
+#![allow(clippy::print_stdout, reason = "it is a program")]
+
 use aldis_services::sim::link::{Bench, Profile, bench};
 
 fn main() {

@@ -149,10 +149,14 @@ mod tests {
 
     #[test]
     fn the_first_rule_that_matches_decides_and_nothing_else_crosses() {
-        let first = Rule { lifespan: Some(Duration::from_secs(5)), ..Rule::new("UMAA::MM::", Class::Command) };
+        let first =
+            Rule { lifespan: Some(Duration::from_secs(5)), ..Rule::new("UMAA::MM::", Class::Command) };
         let both = export(vec![first, Rule::new("UMAA::", Class::State)]);
         let treatment = both.decide(&envelope(1, b""), None).unwrap();
-        assert_eq!((treatment.class, treatment.rule, treatment.lifespan_left_ms), (Class::Command, 0, Some(5_000)));
+        assert_eq!(
+            (treatment.class, treatment.rule, treatment.lifespan_left_ms),
+            (Class::Command, 0, Some(5_000))
+        );
         let none = export(vec![Rule::new("UMAA::SO::", Class::State)]);
         assert_eq!(none.decide(&envelope(1, b""), None), Err(Stays::NoRule));
         let addressed = Rule { address: Prefix::new("eid1").ok(), ..Rule::new("", Class::State) };

@@ -141,9 +141,10 @@ impl Link {
         self.states.tick(now.monotonic);
         let idle = !self.is_due(now.monotonic);
         for index in 0..self.paths.len() {
-            let path = &mut self.paths[index];
-            let timeout = path.overdue_after(idle);
-            for frame in path.sent.overdue(now.monotonic, timeout) {
+            let mut sent = std::mem::take(&mut self.paths[index].sent);
+            let lost = sent.overdue(now.monotonic, |bytes| self.paths[index].overdue_after(idle, bytes));
+            self.paths[index].sent = sent;
+            for frame in lost {
                 self.on_lost(now.monotonic, frame, false);
             }
         }

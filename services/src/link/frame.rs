@@ -174,6 +174,8 @@ pub(super) enum Item<'a> {
 }
 
 const ACK: u8 = 0x10;
+/// An acknowledgement without a delay.
+const PROMPT_ACK: u8 = 0x30;
 const LOSS: u8 = 0x20;
 const VOID: u8 = 0x21;
 const DIGEST: u8 = 0x22;
@@ -265,9 +267,11 @@ impl<'a> Item<'a> {
     pub(super) fn write(&self, last: bool, out: &mut Vec<u8>) {
         match self {
             Self::Ack { largest, delay, before } => {
-                out.push(ACK + before.len() as u8);
+                out.push(if *delay == 0 { PROMPT_ACK } else { ACK } + before.len() as u8);
                 out.extend_from_slice(&largest.to_be_bytes());
-                out.push(*delay);
+                if *delay > 0 {
+                    out.push(*delay);
+                }
                 out.extend_from_slice(before);
             }
             Self::Loss(of_255) => out.extend_from_slice(&[LOSS, *of_255]),
@@ -319,6 +323,11 @@ impl<'a> Item<'a> {
                 largest: reader.u16()?,
                 delay: reader.byte()?,
                 before: reader.take((kind - ACK).into())?,
+            },
+            PROMPT_ACK..=0x38 => Self::Ack {
+                largest: reader.u16()?,
+                delay: 0,
+                before: reader.take((kind - PROMPT_ACK).into())?,
             },
             LOSS => Self::Loss(reader.byte()?),
             VOID => Self::Void { start: reader.varint()?, count: reader.varint()? },

@@ -58,7 +58,7 @@ impl Held {
             }
             number = number.wrapping_add(step);
             let tail = reader.u16()?;
-            let (low, time) = (low | u64::from(tail >> 14) * 32, i64::from(tail) % SHORT_TIMES);
+            let (low, time) = (low + u64::from(tail >> 14) * 32, i64::from(tail) % SHORT_TIMES);
             let whole = u32::try_from(number).map_err(|_| bad)?;
             let (entry, held) = names.instances.get(&whole).zip(self.marks.get(&whole)).ok_or(bad)?;
             let bytes = reader.take(entry.usual as usize)?;

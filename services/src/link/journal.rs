@@ -49,7 +49,7 @@ impl Link {
                 AfterWrite::Release(number) => self.release(now, number, effects),
                 AfterWrite::Safe(number) => self.inbox.make_safe(number),
                 AfterWrite::Acknowledge(path, number) => {
-                    self.acknowledge_command(now.monotonic, path, number)
+                    self.acknowledge_command(now.monotonic, path, number, true)
                 }
             }
         }

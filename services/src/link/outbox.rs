@@ -191,7 +191,7 @@ impl Outbox {
         let crowded = self.is_crowded(hedge);
         let (expires, bytes) = (entry.expires, entry.body.len());
         self.ready.remove(&(entry.urgency, expires.unwrap_or(NEVER), number));
-        let flight = self.flights.entry(number).or_insert_with(|| Flight::new(now));
+        let flight = self.flights.entry(number).or_insert_with(|| Flight::new(now, number));
         self.timers.remove(&(flight.next, number));
         flight.sent(now, end, length, expires, &hedge.of(bytes, crowded));
         self.timers.insert((flight.next, number));

@@ -208,10 +208,11 @@ impl Path {
 
     /// When a frame that nothing was heard of counts as lost, though no later one arrived: its acknowledgement may wait for a
     /// second frame.
-    pub(super) fn overdue_after(&self, idle: bool) -> Duration {
+    pub(super) fn overdue_after(&self, idle: bool, bytes: usize) -> Duration {
         // While nothing else goes out, nothing is to be gained by waiting for later frames to tell.
-        let frames = if idle { 1 } else { 3 };
-        self.timeout(self.config.mtu * frames) + ACK_DELAY
+        let others = if idle { 0 } else { 2 };
+        // A short frame may be acknowledged behind a long one.
+        self.timeout(bytes.max(self.config.mtu) + self.config.mtu * others) + ACK_DELAY
     }
 
     /// A frame came that is to be acknowledged at `due`.

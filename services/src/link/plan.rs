@@ -127,10 +127,11 @@ pub fn plan(carrier: &CarrierConfig, keyed: bool, flows: &[Flow], back: &[Flow])
 fn command_copies(loss: f64) -> f64 {
     let ack_copies = if loss < 0.08 { 1.0 } else { 2.0 };
     let silent = 1.0 - (1.0 - loss) * (1.0 - loss.powf(ack_copies));
-    let second = ((0.01f64.ln() / loss.clamp(0.001, 0.9).ln() - 0.05).ceil() - 1.0).clamp(1.0, 4.0);
+    let second = (0.01f64.ln() / loss.clamp(0.001, 0.9).ln() - 0.35).clamp(1.0, 4.0);
     // After the second round silence is rare, and each round has about two copies.
     let still = silent * (1.0 - (1.0 - silent).powf(second));
-    1.0 + silent * second + if silent.powf(second) < 1.0 { 2.0 * still.powi(2) / (1.0 - silent * 0.5) } else { 0.0 }
+    1.0 + silent * second
+        + if silent.powf(second) < 1.0 { 2.0 * still.powi(2) / (1.0 - silent * 0.5) } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -166,7 +167,11 @@ mod tests {
     fn loss_and_keys_cost() {
         let command = [flow(Class::Command, 64, 1.0, 1)];
         let wanted = |loss, keyed| plan(&carrier(1_200, loss), keyed, &command, &[]).flows[0].wanted;
-        assert!(wanted(0.0, false) < 90.0 && wanted(0.3, false) > 170.0 && wanted(0.5, false) > wanted(0.3, false));
+        assert!(
+            wanted(0.0, false) < 90.0
+                && wanted(0.3, false) > 170.0
+                && wanted(0.5, false) > wanted(0.3, false)
+        );
         assert!(wanted(0.3, true) > wanted(0.3, false) + 15.0);
     }
 

@@ -23,6 +23,8 @@ struct Digested {
     refused: bool,
     /// A command, or word of one: the acknowledgement is urgent.
     urgent: bool,
+    /// Something that was not there before: its acknowledgement is worth copies.
+    fresh: bool,
     /// Something must be written before the frame is acknowledged.
     writes: bool,
     /// The numbers taken have changed.
@@ -46,6 +48,13 @@ impl Link {
             return;
         };
         let Some(opened) = self.open(index, frame, effects) else { return };
+        // A hello of the present life that comes again is a replay: it must not be answered.
+        let present = self.session.peer.filter(|_| !self.session.remembered).map(|peer| peer.boot);
+        let same_life = opened.hello.is_none_or(|hello| Some(hello.boot) == present);
+        if same_life && !self.paths[index].received.is_new(opened.number) {
+            self.counters.frames_repeated += 1;
+            return;
+        }
         let greeting = match &opened.hello {
             Some(hello) => self.on_hello(now, hello, effects),
             None => Greeting::Known,
@@ -165,12 +174,13 @@ impl Link {
             Item::Ack { .. } => self.on_ack(now, index, &item, effects),
             Item::Loss(loss) => self.paths[index].loss_out = f64::from(loss) / 255.0,
             Item::Void { start, count } => {
+                digested.fresh = true;
                 let marked = self.inbox.void(start, count);
                 digested.refused |= !marked;
                 (digested.taken, digested.writes, digested.urgent) = (true, true, true);
             }
             Item::Command(command) => self.on_command(now, index, &command, digested),
-            Item::State(state) => digested.refused |= !self.on_state(now, index, &state, effects),
+            Item::State(state) => digested.refused |= !self.on_state(index, &state, effects),
             Item::Compact(block) => digested.refused |= !self.on_compact(block, effects),
             Item::Digest { count, digest } => {
                 let held = self.held.digest();
@@ -206,7 +216,7 @@ impl Link {
                 self.counters.commands_late = self.inbox.late;
             }
             Took::New => {
-                (digested.writes, digested.taken) = (true, true);
+                (digested.writes, digested.taken, digested.fresh) = (true, true, true);
                 self.after_write.push(AfterWrite::Safe(command.number));
                 self.keep(now, command.number);
             }
@@ -231,7 +241,7 @@ impl Link {
         self.inbox.finish(number);
     }
 
-    fn on_state(&mut self, now: Now, index: usize, state: &StateItem<'_>, effects: &mut Vec<Effect>) -> bool {
+    fn on_state(&mut self, index: usize, state: &StateItem<'_>, effects: &mut Vec<Effect>) -> bool {
         let names = &self.peer_names;
         let Some(instance) = names.instances.get(&state.alias) else { return false };
         let entry = names.labels.get(&instance.label).zip(names.origins.get(&state.origin));
@@ -259,8 +269,6 @@ impl Link {
         let content = Bytes::copy_from_slice(state.bytes);
         let envelope = body::sample(entry, origin, instance.instance.clone(), what, left, content);
         effects.push(Effect::Deliver(Delivery { id: None, envelope, class: Class::State, recovered: false }));
-        // What is held lives by this end's clock from here on.
-        let _ = now;
         true
     }
 
@@ -321,7 +329,7 @@ impl Link {
         if digested.writes {
             self.after_write.push(AfterWrite::Acknowledge(index, number));
         } else if digested.urgent || !digested.content {
-            self.acknowledge_command(now, index, number);
+            self.acknowledge_command(now, index, number, digested.fresh || !digested.content);
         } else {
             let path = &mut self.paths[index];
             path.received.acknowledge(number);
@@ -336,11 +344,12 @@ impl Link {
     }
 
     /// All that a frame carried is safe, and its sender waits for word.
-    pub(super) fn acknowledge_command(&mut self, now: Monotonic, index: usize, number: u64) {
+    /// What came before gets one copy of the acknowledgement: more copies of the command are on the air, and each is acknowledged.
+    pub(super) fn acknowledge_command(&mut self, now: Monotonic, index: usize, number: u64, fresh: bool) {
         let path = &mut self.paths[index];
         path.received.acknowledge(number);
         path.acks.taken += 1;
-        path.acks.copies = path.ack_copies();
+        path.acks.copies = path.acks.copies.max(if fresh { path.ack_copies() } else { 1 });
         path.owe(now);
     }
 }

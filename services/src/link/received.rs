@@ -29,6 +29,12 @@ impl Received {
         if whole > self.next + u64::from(u16::MAX) { u64::from(low) } else { whole }
     }
 
+    /// Whether a number was not seen before, as far as can be told.
+    pub(super) fn is_new(&self, number: u64) -> bool {
+        number >= self.next
+            || (self.next - 1 - number < WINDOW && self.seen & 1 << (self.next - 1 - number) == 0)
+    }
+
     /// Takes a number down; false for one that was seen before or is too old to tell.
     pub(super) fn see(&mut self, number: u64) -> bool {
         if number >= self.next {
@@ -44,10 +50,10 @@ impl Received {
             self.next = number + 1;
             return true;
         }
-        let back = self.next - 1 - number;
-        if back >= WINDOW || self.seen & 1 << back != 0 {
+        if !self.is_new(number) {
             return false;
         }
+        let back = self.next - 1 - number;
         self.seen |= 1 << back;
         // It was counted as lost when the gap was seen.
         self.loss = (self.loss - LOSS_WEIGHT).max(0.0);
@@ -72,7 +78,11 @@ impl Received {
         let largest = (self.next - 1 - u64::from(skip)) as u16;
         let before = (self.safe >> skip) >> 1;
         let bytes = before.to_le_bytes();
-        let length = bytes.iter().take(most.min(ACK_BYTES_MAX)).rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
+        let length = bytes
+            .iter()
+            .take(most.min(ACK_BYTES_MAX))
+            .rposition(|byte| *byte != 0)
+            .map_or(0, |last| last + 1);
         Some((largest, bytes[..length].to_vec()))
     }
 

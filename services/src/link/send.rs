@@ -197,7 +197,7 @@ impl Link {
         let idle = !self.is_due(now);
         for index in 0..self.paths.len() {
             let path = &self.paths[index];
-            at(path.sent.oldest().map(|oldest| oldest + path.overdue_after(idle)));
+            at(path.sent.oldest().map(|(at, bytes)| at + path.overdue_after(idle, bytes)));
             at(path.heard_until().filter(|until| *until > now));
             if path.up && path.free && !self.silent {
                 let wish = self.next_wish(now, index).max(path.next_send);

@@ -98,10 +98,12 @@ impl Sent {
         outcome
     }
 
-    /// Frames that are not acknowledged after `timeout`.
-    pub(super) fn overdue(&mut self, now: Monotonic, timeout: Duration) -> Vec<SentFrame> {
+    /// Frames that are not acknowledged in the time that one of their length has.
+    pub(super) fn overdue(&mut self, now: Monotonic, time: impl Fn(usize) -> Duration) -> Vec<SentFrame> {
         let mut lost = Vec::new();
-        while let Some(first) = self.waiting.first_entry().filter(|first| first.get().at + timeout <= now) {
+        while let Some(first) =
+            self.waiting.first_entry().filter(|first| first.get().at + time(first.get().bytes) <= now)
+        {
             let (number, frame) = first.remove_entry();
             lost.push(self.give_up(number, frame));
         }
@@ -114,9 +116,9 @@ impl Sent {
         std::mem::take(&mut self.waiting).into_values().collect()
     }
 
-    /// When the oldest frame that waits was sent.
-    pub(super) fn oldest(&self) -> Option<Monotonic> {
-        self.waiting.first_key_value().map(|(_, frame)| frame.at)
+    /// When the oldest frame that waits was sent, and its length.
+    pub(super) fn oldest(&self) -> Option<(Monotonic, usize)> {
+        self.waiting.first_key_value().map(|(_, frame)| (frame.at, frame.bytes))
     }
 
     fn give_up(&mut self, number: u64, frame: SentFrame) -> SentFrame {
@@ -155,8 +157,9 @@ mod tests {
     #[test]
     fn what_nobody_acknowledges_is_overdue() {
         let mut sent = sent(3);
-        let lost = sent.overdue(Monotonic::since_start(Duration::from_millis(2_500)), Duration::from_secs(2));
-        assert_eq!((lost.len(), sent.oldest().unwrap().elapsed().as_secs()), (1, 1));
+        let lost =
+            sent.overdue(Monotonic::since_start(Duration::from_millis(2_500)), |_| Duration::from_secs(2));
+        assert_eq!((lost.len(), sent.oldest().unwrap().0.elapsed().as_secs()), (1, 1));
         assert_eq!(sent.take_all().len(), 2);
     }
 }

@@ -126,8 +126,9 @@ impl Link {
             && let Some((largest, before)) = path.received.acknowledgement(bits)
         {
             let delay = (now - path.acks.newest).as_millis() / DELAY_UNIT.as_millis();
-            let bytes = 4 + before.len();
-            load.push(Chosen::Ack { largest, delay: delay.min(255) as u8, before }, bytes, None);
+            let delay = delay.min(255) as u8;
+            let bytes = 3 + usize::from(delay > 0) + before.len();
+            load.push(Chosen::Ack { largest, delay, before }, bytes, None);
             path.acks.taken = 0;
             path.acks.copies -= 1;
             path.acks.due = (path.acks.copies > 0).then_some(now);

