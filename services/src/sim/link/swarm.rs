@@ -82,11 +82,9 @@ impl Options {
 #[derive(Debug, Clone, Copy)]
 struct Known {
     offered: Monotonic,
-    accepted: bool,
     /// The sender's machine died before the last word.
     orphaned: bool,
     last_word: Option<(Monotonic, bool)>,
-    arrived: Option<Monotonic>,
 }
 
 struct Run {
@@ -167,8 +165,7 @@ impl Run {
                 let envelope = command(from, to, number, at.elapsed(), self.options.lifespan);
                 let ticket = self.world.offer(self.ports[end], envelope, Class::Command);
                 self.tickets.insert(ticket, (from, number));
-                let known =
-                    Known { offered: at, accepted: false, orphaned: false, last_word: None, arrived: None };
+                let known = Known { offered: at, orphaned: false, last_word: None };
                 self.known.insert((from, number), known);
             }
             for instance in 0..self.options.states {
@@ -228,7 +225,7 @@ impl Run {
             match what {
                 What::Ticket(ticket, state) => self.on_word(at, ticket, &state),
                 What::Delivered(delivery) => match delivery.class {
-                    Class::Command => self.on_command(at, &delivery.envelope, delivery.recovered),
+                    Class::Command => self.on_command(&delivery.envelope, delivery.recovered),
                     Class::State => self.on_state(port, &delivery.envelope),
                     Class::Bulk => {
                         let same = bulk(400, 1, Duration::ZERO, self.options.bulk);
@@ -245,29 +242,19 @@ impl Run {
         let known = self.tickets.get(&ticket).and_then(|key| self.known.get_mut(key));
         let Some(known) = known else { return };
         match state {
-            TicketState::Accepted { .. } => known.accepted = true,
-            TicketState::OnAir { .. } => {}
+            TicketState::Accepted { .. } | TicketState::OnAir { .. } => {}
             TicketState::Delivered { .. } => known.last_word = Some((at, true)),
             _ => known.last_word = Some((at, false)),
         }
     }
 
-    fn on_command(&mut self, at: Monotonic, envelope: &aldis_envelope::Envelope, recovered: bool) {
+    fn on_command(&mut self, envelope: &aldis_envelope::Envelope, recovered: bool) {
         let (from, number) = command_number(&envelope.message.content);
         let last = self.last.entry(from).or_default();
         if number < *last && !recovered {
             self.complaints.push(format!("command {number} of {from} came after {last}"));
         }
         *last = number.max(*last);
-        let lifespan = self.options.lifespan;
-        if let Some(known) = self.known.get_mut(&(from, number)) {
-            let late = at - known.offered > lifespan + Duration::from_secs(1);
-            // One that waited in the receiver's journal for its restart, or for one before it, is delivered all the same.
-            if late && !recovered && self.crashes == 0 && known.arrived.is_none() {
-                known.arrived = Some(at);
-            }
-            known.arrived = known.arrived.or(Some(at));
-        }
     }
 
     fn on_state(&mut self, port: Port, envelope: &aldis_envelope::Envelope) {
