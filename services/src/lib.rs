@@ -14,6 +14,7 @@ pub mod health;
 mod host;
 pub mod journal;
 mod labels;
+pub mod link;
 pub mod log;
 pub mod map;
 pub mod node;

@@ -2,16 +2,16 @@
 //!
 //! - [`World`] holds machines: nodes with clocks of their own, sessions on the bus, and disks with journals. Faults are its methods:
 //!   sessions that drop, partitions, crashes with torn writes, restarts, stalls, clocks that step.
-//! - [`Channel`] carries datagrams as a radio does: loss in bursts, delay, reordering, duplicates, a rate, a queue.
+//! - [`link`] carries datagrams as a radio does: loss in bursts, delay, reordering, duplicates, a rate, a queue.
 //! - [`Options`] are drawn from a seed: which faults there are, and how strong.
 //! - A [`Workload`] says which nodes there are and what they do; its [`Checker`]s watch from outside.
 //! - [`run()`] runs a seed: a safety phase with faults, then a liveness phase in which all faults have ended and everything
 //!   must come right. The same seed gives the same trace, byte for byte; [`Report`] holds its hash and, with a violation, its end.
 
-mod channel;
 pub mod chatter;
 mod disk;
 mod faults;
+pub mod link;
 mod machine;
 mod network;
 mod observe;
@@ -20,7 +20,6 @@ mod run;
 mod trace;
 mod world;
 
-pub use channel::{Channel, Profile};
 pub use disk::{DiskFaults, SimDisk};
 pub use network::meets;
 pub use observe::{Checker, Fact, Facts, Observation, Seen, Violation};

@@ -1,0 +1,17 @@
+//! The lossy link in virtual time: an emulator of bad links, machines with journals that crash, and the measure of the protocol.
+
+mod bench;
+mod crash;
+mod disk;
+mod emulator;
+mod load;
+mod rows;
+mod swarm;
+mod world;
+
+pub use bench::{Bench, Row, bench};
+pub use crash::{CrashReport, crash};
+pub use disk::Disk;
+pub use emulator::{Burst, Profile, Way};
+pub use swarm::{SwarmReport, swarm};
+pub use world::{LinkWorld, Machine, MachineId, Port, Seen, What};

@@ -1,0 +1,298 @@
+//! The table of goals of the lossy link, measured.
+
+use super::crash::crash;
+use super::emulator::Profile;
+use super::load::{mean, percentile};
+use super::rows::{self, Setting};
+use super::swarm::swarm;
+use std::time::Duration;
+
+/// One row of the table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Its name in the table.
+    pub name: &'static str,
+    /// What is to be reached, in words.
+    pub goal: String,
+    /// What was measured, in words.
+    pub measured: String,
+    /// Whether it was reached.
+    pub met: bool,
+}
+
+/// What is to be measured.
+#[derive(Debug, Clone)]
+pub struct Bench {
+    /// The link.
+    pub profile: Profile,
+    /// With keys; figures may then be 10 % worse.
+    pub keyed: bool,
+    /// How much of the full measurement, 1 for all of it.
+    pub part: f64,
+    /// The seed of everything.
+    pub seed: u64,
+    /// The rows, by name; none for all.
+    pub only: Vec<String>,
+}
+
+impl Bench {
+    fn setting(&self) -> Setting {
+        Setting { profile: self.profile.clone(), keyed: self.keyed, seed: self.seed }
+    }
+
+    fn count(&self, full: u64) -> u64 {
+        ((full as f64 * self.part) as u64).max(1)
+    }
+
+    /// A limit with what keys may cost.
+    fn limit(&self, limit: f64) -> f64 {
+        if self.keyed { limit * 1.1 } else { limit }
+    }
+
+    fn wants(&self, name: &str) -> bool {
+        self.only.is_empty() || self.only.iter().any(|only| only.eq_ignore_ascii_case(name))
+    }
+}
+
+/// How a row is measured.
+type Measure = fn(&Bench) -> Row;
+
+/// Measures the rows that have a goal on this link.
+pub fn bench(bench: &Bench) -> Vec<Row> {
+    let rows: &[(&str, Measure)] = match bench.profile.name {
+        "L1" => &[
+            ("G1", g1),
+            ("G2", g2),
+            ("G2b", g2_backlog),
+            ("G3", g3),
+            ("G4", g4),
+            ("G5", g5),
+            ("G5n", g5_nothing),
+            ("G6", g6),
+            ("G7", g7),
+            ("G8", g8),
+            ("G9", g9),
+            ("G10", g10),
+            ("G11", g11),
+            ("G12", g12),
+            ("G14", g14),
+            ("G15", g15),
+        ],
+        "L2" => &[("G1", g1), ("G3", g3), ("G8", g8)],
+        "L3" => &[("G1", g1), ("G3", g3), ("G12", g12)],
+        "L4" => &[("G1", g1), ("G3", g3), ("G4", g4), ("G5", g5)],
+        _ => &[("G1", g1), ("G2", g2_wifi), ("G3", g3)],
+    };
+    rows.iter().filter(|(name, _)| bench.wants(name)).map(|(_, row)| row(bench)).collect()
+}
+
+fn g1(bench: &Bench) -> Row {
+    let (count, seeds) = (bench.count(10_000), bench.count(20));
+    let slow = bench.profile.name == "L3";
+    let runs = [(bench.profile.loss, if slow { 300 } else { 60 }), (0.5, if slow { 300 } else { 120 })];
+    let (mut words, mut met) = (Vec::new(), true);
+    // Only L1 has the second run.
+    for (loss, lifespan) in runs.into_iter().take(if bench.profile.name == "L1" { 2 } else { 1 }) {
+        let mut setting = bench.setting();
+        setting.profile.loss = loss;
+        let (mut fewest, mut twice, mut out_of_order) = (count, 0, 0);
+        for seed in 0..seeds {
+            let once = rows::exactly_once(&setting.seeded(seed), count, Duration::from_secs(lifespan));
+            fewest = fewest.min(once.delivered);
+            twice += once.twice;
+            out_of_order += once.out_of_order;
+        }
+        met &= fewest == count && twice == 0 && out_of_order == 0;
+        let percent = loss * 100.0;
+        words.push(format!("{percent:.0} %: at least {fewest} of {count} in each of {seeds}, {twice} twice, {out_of_order} out of order"));
+    }
+    Row {
+        name: "G1",
+        goal: format!("{count} of {count}, 0 twice, 0 out of order"),
+        measured: words.join("; "),
+        met,
+    }
+}
+
+fn g2(bench: &Bench) -> Row {
+    let mut latency = rows::latency(&bench.setting(), bench.count(10_000), Duration::from_secs(2), false);
+    let [p50, p99, p999] = latency.percentiles();
+    let copies = latency.copies;
+    let limits = [0.45, 1.4, 2.3, 2.6].map(|limit| bench.limit(limit));
+    let met = p50 <= limits[0] && p99 <= limits[1] && p999 <= limits[2] && copies <= limits[3];
+    let measured = format!("{p50:.2} / {p99:.2} / {p999:.2} s at {copies:.2} copies");
+    Row { name: "G2", goal: "0.45 / 1.4 / 2.3 s at no more than 2.6 copies".into(), measured, met }
+}
+
+fn g2_backlog(bench: &Bench) -> Row {
+    let mut latency = rows::latency(&bench.setting(), bench.count(10_000), Duration::from_secs(2), true);
+    let [p50, p99, p999] = latency.percentiles();
+    let limits = [0.55, 1.9, 2.9].map(|limit| bench.limit(limit));
+    let met = p50 <= limits[0] && p99 <= limits[1] && p999 <= limits[2];
+    let measured = format!("{p50:.2} / {p99:.2} / {p999:.2} s at {:.2} copies", latency.copies);
+    Row { name: "G2b", goal: "beside 10 x backlog 0.55 / 1.9 / 2.9 s".into(), measured, met }
+}
+
+fn g2_wifi(bench: &Bench) -> Row {
+    let mut latency = rows::latency(&bench.setting(), bench.count(10_000), Duration::from_millis(200), false);
+    let [p50, p99, _] = latency.percentiles();
+    let measured = format!("p50 {:.1} ms, p99 {:.1} ms", p50 * 1_000.0, p99 * 1_000.0);
+    Row { name: "G2", goal: "p99 at most 25 ms".into(), measured, met: p99 <= bench.limit(0.025) }
+}
+
+fn g3(bench: &Bench) -> Row {
+    let lifespan = Duration::from_secs(if bench.profile.name == "L3" { 300 } else { 15 });
+    let told = rows::refused(&bench.setting(), bench.count(5_000), lifespan);
+    let goal = "all undelivered told within lifespan + 1 RTT".into();
+    let measured = format!(
+        "{} offered, {} delivered, {} told, {} untold or late, {} told wrongly",
+        told.offered, told.delivered, told.told, told.untold, told.lies
+    );
+    Row { name: "G3", goal, measured, met: told.untold == 0 && told.lies == 0 }
+}
+
+fn g4(bench: &Bench) -> Row {
+    let mut seconds = rows::after_outage(&bench.setting(), bench.count(400));
+    let (p50, p95) = (percentile(&mut seconds, 0.5), percentile(&mut seconds, 0.95));
+    let measured = format!("p50 {p50:.2} s, p95 {p95:.2} s of {}", seconds.len());
+    Row { name: "G4", goal: "p95 1.5 s after a 10 min outage".into(), measured, met: p95 <= bench.limit(1.5) }
+}
+
+fn g5(bench: &Bench) -> Row {
+    let runs: Vec<_> =
+        (0..bench.count(100)).map(|seed| rows::resync(&bench.setting().seeded(seed), 1.0)).collect();
+    let mut seconds: Vec<_> = runs.iter().map(|run| run.seconds).collect();
+    let base = 9_600.0 / (1.0 - bench.profile.loss);
+    let forward = mean(&runs.iter().map(|run| run.forward / base).collect::<Vec<_>>());
+    let both = mean(&runs.iter().map(|run| run.both / base).collect::<Vec<_>>());
+    let (p50, p95) = (percentile(&mut seconds, 0.5), percentile(&mut seconds, 0.95));
+    let limits = [14.5, 17.0, 1.2, 1.25].map(|limit| bench.limit(limit));
+    let met = p50 <= limits[0] && p95 <= limits[1] && forward <= limits[2] && both <= limits[3];
+    let measured =
+        format!("{p50:.1} s median, {p95:.1} s p95; {forward:.2} x forward, {both:.2} x with acks");
+    Row { name: "G5", goal: "14.5 s median, 17 s p95; 1.20 x, 1.25 x".into(), measured, met }
+}
+
+fn g5_nothing(bench: &Bench) -> Row {
+    let runs = (0..bench.count(100)).map(|seed| rows::resync(&bench.setting().seeded(seed), 0.0));
+    let mut both: Vec<_> = runs.map(|run| run.both).collect();
+    let most = percentile(&mut both, 1.0);
+    let measured = format!("{most:.0} B at most");
+    Row { name: "G5n", goal: "300 B when nothing changed".into(), measured, met: most <= bench.limit(300.0) }
+}
+
+fn g6(bench: &Bench) -> Row {
+    let seconds = bench.count(3_600);
+    let (alone, p99, queued) = rows::overload(&bench.setting(), seconds, false);
+    let (beside, ..) = rows::overload(&bench.setting(), seconds, true);
+    let limits = [0.95, 3.0, 1.05].map(|limit| bench.limit(limit));
+    let met = alone <= limits[0] && p99 <= limits[1] && beside <= limits[2] && queued <= 10;
+    let measured = format!(
+        "{alone:.2} / {p99:.2} s alone, {beside:.2} s beside commands; {queued} queued of 10 instances"
+    );
+    Row {
+        name: "G6",
+        goal: "age 0.95 / 3 s alone, 1.05 s beside commands; one queued an instance".into(),
+        measured,
+        met,
+    }
+}
+
+fn g7(bench: &Bench) -> Row {
+    let count = bench.count(3_000);
+    let at = |mtu| rows::queueing(&bench.setting(), count, mtu);
+    let (large, small) = (at(256), at(128));
+    let met = large <= bench.limit(0.22) && small <= bench.limit(0.13);
+    let measured = format!("p99.9 {large:.3} s with 256 B, {small:.3} s with 128 B");
+    Row { name: "G7", goal: "p99.9 0.22 s with 256 B frames, 0.13 s with 128 B".into(), measured, met }
+}
+
+fn g8(bench: &Bench) -> Row {
+    let runs = bench.count(40);
+    let mut rates: Vec<_> = (0..runs).map(|seed| rows::bulk(&bench.setting().seeded(seed), 60_000)).collect();
+    let median = percentile(&mut rates, 0.5);
+    let goal = if bench.profile.name == "L2" { 0.75 * 6.72 } else { 5.7 };
+    let met = median >= if bench.keyed { goal / 1.1 } else { goal };
+    Row { name: "G8", goal: format!("{goal:.2} kbit/s median"), measured: format!("{median:.2} kbit/s"), met }
+}
+
+fn g9(bench: &Bench) -> Row {
+    let latency = rows::latency(&bench.setting(), bench.count(10_000), Duration::from_secs(2), false);
+    let met = latency.bytes <= bench.limit(230.0);
+    Row { name: "G9", goal: "230 B a command".into(), measured: format!("{:.0} B", latency.bytes), met }
+}
+
+fn g10(bench: &Bench) -> Row {
+    let report = crash(bench.count(1_000), bench.seed);
+    let met = report.lost == 0 && report.twice == 0;
+    let measured = format!(
+        "{} lost and {} twice of {} accepted, {} crashes, {} during a write",
+        report.lost, report.twice, report.accepted, report.points, report.during_a_write
+    );
+    Row { name: "G10", goal: "0 lost, 0 twice at 1000 crashes".into(), measured, met }
+}
+
+fn g11(bench: &Bench) -> Row {
+    let hours = bench.count(100);
+    let at = |loss| {
+        let mut setting = bench.setting();
+        setting.profile.loss = loss;
+        rows::idle(&setting, hours)
+    };
+    let (lossy, clean) = (at(0.3), at(0.0));
+    let alarms = lossy.false_alarms_per_hour;
+    let met = lossy.bytes_per_second <= bench.limit(11.0)
+        && clean.bytes_per_second <= bench.limit(4.0)
+        && alarms <= bench.limit(0.15)
+        && lossy.detection.max(clean.detection) <= 10.5
+        && lossy.silent_bytes + clean.silent_bytes == 0;
+    let measured = format!(
+        "{:.1} B/s at 30 % loss, {:.1} without, {} silent; {alarms:.2} false alarms an hour, cut told after {:.1} s",
+        lossy.bytes_per_second,
+        clean.bytes_per_second,
+        lossy.silent_bytes + clean.silent_bytes,
+        lossy.detection.max(clean.detection)
+    );
+    Row {
+        name: "G11",
+        goal: "11 B/s at 30 % loss, 4 without, 0 silent; 0.15 false alarms an hour".into(),
+        measured,
+        met,
+    }
+}
+
+fn g12(bench: &Bench) -> Row {
+    let (over, used) = rows::budget(&bench.setting(), bench.count(3_600).max(60));
+    let met = over <= bench.profile.mtu as i64 && used >= 0.97;
+    let measured = format!("{over} B over the rate in the worst 10 s, {:.1} % used", used * 100.0);
+    Row {
+        name: "G12",
+        goal: format!("at most {} B over, at least 97 % used", bench.profile.mtu),
+        measured,
+        met,
+    }
+}
+
+fn g14(bench: &Bench) -> Row {
+    let count = bench.count(1_000);
+    let (once, seconds) = rows::through_shore(&bench.setting(), count);
+    let met = once.delivered == count && once.twice == 0 && once.out_of_order == 0;
+    let measured = format!(
+        "{} of {count}, {} twice, {} out of order; the hour's backlog through in {seconds:.0} s",
+        once.delivered, once.twice, once.out_of_order
+    );
+    Row { name: "G14", goal: "G1 holds by way of shore through an hour's partition".into(), measured, met }
+}
+
+fn g15(bench: &Bench) -> Row {
+    let report = swarm(bench.part * 500.0, bench.seed);
+    let measured = format!(
+        "{} broken in {:.0} link-hours of {} links with {} crashes{}",
+        report.violations.len(),
+        report.hours,
+        report.links,
+        report.crashes,
+        report.violations.first().map_or(String::new(), |first| format!(": {first}"))
+    );
+    Row { name: "G15", goal: "0 broken".into(), measured, met: report.violations.is_empty() }
+}
