@@ -15,7 +15,7 @@ const PACKAGES: [(&str, &[&str]); 3] = [
 /// circle can be.
 const LAYERS: [&[&str]; 7] = [
     &["service"],
-    &["allow", "calls", "counters", "event", "map", "notes", "streams"],
+    &["allow", "calls", "counters", "event", "map", "notes", "plan", "streams"],
     &["bridge", "labels"],
     &["health", "log", "track"],
     &["host", "registry"],
