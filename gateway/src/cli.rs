@@ -1,5 +1,6 @@
 //! The command line.
 
+mod assign;
 mod bench;
 mod call;
 mod check;
@@ -57,6 +58,8 @@ enum Command {
     Call(call::CallArgs),
     /// Show who is there.
     Fleet(fleet::FleetArgs),
+    /// Say which vehicle does which task, in which way and order.
+    Assign(assign::Assign),
     /// Measure this machine, side by side with the limit.
     Bench(bench::Bench),
 }
@@ -74,6 +77,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Sub(args) => args.run(),
         Command::Call(args) => args.run(),
         Command::Fleet(args) => args.run(),
+        Command::Assign(args) => args.run(),
         Command::Bench(args) => args.run(),
     };
     match done {

@@ -4,6 +4,7 @@
 //! so that a plan depends on its request alone.
 
 pub mod algebra;
+pub mod assignment;
 
 /// A golden of the reference, which lies beside the project and is no part of it; without it tests say that they were
 /// skipped.

@@ -18,8 +18,8 @@ pub enum Unnamed {
     LeaveOut,
 }
 
-/// Puts the compositions of the tasks into the relationships of the request. Atoms of the result are task and option.
-/// Without relationships all tasks are done in any order.
+/// Puts the compositions of the tasks into the relationships of the request. Atoms of the result are task and option, and
+/// `known` says which there are. Without relationships all tasks are done in any order.
 ///
 /// # Errors
 /// The first mistake in one of the texts: wrong form, a task or option that is not there, one named twice, a task that is
@@ -27,6 +27,7 @@ pub enum Unnamed {
 pub fn compose(
     relationships: &str,
     compositions: &BTreeMap<i64, &str>,
+    known: &impl Fn(i64, i64) -> bool,
     unnamed: Unnamed,
 ) -> Result<Expression<(i64, i64)>, AlgebraError> {
     let relations = if relationships.trim().is_empty() {
@@ -41,16 +42,22 @@ pub fn compose(
         at,
         mistake,
     };
+    let whole = substitute(&relations, &mut |atom: &Named| {
+        let text = compositions.get(&atom.id).ok_or_else(|| wrong(atom.at, Mistake::NoSuchTask(atom.id)))?;
+        let whose = format!("the composition of task {}", atom.id);
+        parse(text, Reading::Strict, &whose)?.map(&mut |option: &Named| {
+            let (task, option, at) = (atom.id, option.id, option.at);
+            let mistake = Mistake::NoSuchOption { task, option };
+            let missing = || AlgebraError { whose: whose.clone(), text: (*text).to_owned(), at, mistake };
+            known(task, option).then_some((task, option)).ok_or_else(missing)
+        })
+    })?;
     let named: BTreeSet<_> = relations.atoms().into_iter().map(|atom| atom.id).collect();
     let left_out = compositions.keys().find(|task| !named.contains(task));
     if let (Some(&task), Unnamed::Refuse) = (left_out, unnamed) {
         return Err(wrong(relationships.len(), Mistake::LeftOut(task)));
     }
-    substitute(&relations, &mut |atom: &Named| {
-        let text = compositions.get(&atom.id).ok_or_else(|| wrong(atom.at, Mistake::NoSuchTask(atom.id)))?;
-        let composition = parse(text, Reading::Strict, &format!("the composition of task {}", atom.id))?;
-        composition.map(&mut |option: &Named| Ok((atom.id, option.id)))
-    })
+    Ok(whole)
 }
 
 /// Puts an expression in the place of each atom.

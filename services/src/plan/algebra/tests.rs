@@ -110,7 +110,7 @@ fn mistakes_point_into_the_text() {
 #[test]
 fn compositions_take_the_place_of_their_tasks() {
     let compositions = BTreeMap::from([(1, "+(p10 p11 )"), (2, "p10 "), (3, ".(p1 p2)")]);
-    let composed = |text| compose(text, &compositions, Unnamed::Refuse);
+    let composed = |text| compose(text, &compositions, &|_, option| option != 99, Unnamed::Refuse);
     let atoms = composed("").unwrap().atoms().into_iter().copied().collect::<Vec<_>>();
     assert_eq!(atoms, [(1, 10), (1, 11), (2, 10), (3, 1), (3, 2)]);
     for (text, part) in [
@@ -121,9 +121,12 @@ fn compositions_take_the_place_of_their_tasks() {
         let told = composed(text).unwrap_err().to_string();
         assert!(told.contains(part), "{text}: {told}");
     }
-    assert_eq!(compose("|(p1 p2)", &compositions, Unnamed::LeaveOut).unwrap().atoms().len(), 3);
-    let wrong = compose("", &BTreeMap::from([(7, "p10")]), Unnamed::Refuse).unwrap_err();
-    assert!(wrong.to_string().starts_with("the composition of task 7, character 1"), "{wrong}");
+    assert_eq!(compose("|(p1 p2)", &compositions, &|_, _| true, Unnamed::LeaveOut).unwrap().atoms().len(), 3);
+    for text in ["p10", "p99 "] {
+        let wrong = compose("", &BTreeMap::from([(7, text)]), &|_, option| option != 99, Unnamed::Refuse);
+        let told = wrong.unwrap_err().to_string();
+        assert!(told.starts_with("the composition of task 7, character 1"), "{told}");
+    }
 }
 
 #[test]
