@@ -5,6 +5,9 @@
 
 pub mod algebra;
 pub mod assignment;
+pub mod flat_earth;
+pub mod line_search;
+pub mod sensor;
 
 /// A golden of the reference, which lies beside the project and is no part of it; without it tests say that they were
 /// skipped.
