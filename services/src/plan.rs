@@ -6,6 +6,7 @@
 pub mod algebra;
 pub mod assignment;
 pub mod flat_earth;
+pub mod free_space;
 pub mod line_search;
 pub mod sensor;
 
