@@ -9,6 +9,7 @@ pub mod flat_earth;
 pub mod free_space;
 pub mod line_search;
 pub mod sensor;
+pub mod turning;
 
 /// A golden of the reference, which lies beside the project and is no part of it; without it tests say that they were
 /// skipped.

@@ -182,6 +182,21 @@ impl FreeSpace {
         verify::is_free(&self.mesh, (from, &self.locator.holders(&self.mesh, from)), to)
     }
 
+    /// Whether a corner of an outline lies within a triangle or on its border, its own corners left out.
+    pub fn has_corner_in(&self, triangle: [Point; 3]) -> bool {
+        let [a, b, c] = triangle;
+        let side = |from, to, point| mesh::orient(from, to, point);
+        let turn = side(a, b, c);
+        let within = |point: &Point| {
+            let sides = [side(a, b, *point), side(b, c, *point), side(c, a, *point)];
+            sides.iter().all(|side| side * turn >= 0.0)
+        };
+        let (low, high) =
+            ((a.0.min(b.0).min(c.0), a.1.min(b.1).min(c.1)), (a.0.max(b.0).max(c.0), a.1.max(b.1).max(c.1)));
+        let near = |p: &&Point| p.0 >= low.0 && p.0 <= high.0 && p.1 >= low.1 && p.1 <= high.1;
+        self.mesh.points.iter().filter(near).any(|point| !triangle.contains(point) && within(point))
+    }
+
     /// The shortest way from a place to another.
     ///
     /// # Errors
