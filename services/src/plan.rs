@@ -7,7 +7,9 @@ pub mod algebra;
 pub mod assignment;
 pub mod flat_earth;
 pub mod free_space;
+pub mod geodesy;
 pub mod line_search;
+pub mod route_file;
 pub mod sensor;
 pub mod turning;
 

@@ -45,7 +45,7 @@ pub struct Effort {
 impl Default for Effort {
     /// About a second on a machine of 2025.
     fn default() -> Self {
-        Self { nodes: 200_000, seed: 1 }
+        Self { nodes: 150_000, seed: 1 }
     }
 }
 

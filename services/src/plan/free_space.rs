@@ -269,6 +269,9 @@ fn grown(outline: Vec<Ring>, room_m: f64) -> Vec<Ring> {
     if room_m <= 0.0 {
         return outline;
     }
+    if let Some(moved) = outline.iter().map(|ring| grow::moved(ring, room_m)).collect::<Option<Vec<_>>>() {
+        return grid::union(&moved);
+    }
     let mut pieces: Vec<Ring> = outline.iter().flat_map(|ring| grow::right_of(ring, room_m)).collect();
     pieces.extend(outline);
     grid::union(&pieces)
@@ -278,6 +281,9 @@ fn grown(outline: Vec<Ring>, room_m: f64) -> Vec<Ring> {
 fn shrunk(outline: Vec<Ring>, room_m: f64) -> Vec<Ring> {
     if room_m <= 0.0 {
         return outline;
+    }
+    if let Some(moved) = outline.iter().map(|ring| grow::moved(ring, -room_m)).collect::<Option<Vec<_>>>() {
+        return grid::union(&moved);
     }
     let back = |ring: &Ring| ring.iter().rev().copied().collect::<Ring>();
     let pieces: Vec<Ring> = outline.iter().flat_map(|ring| grow::right_of(&back(ring), room_m)).collect();

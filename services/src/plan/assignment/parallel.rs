@@ -12,7 +12,7 @@ const GROUPS_MAX: usize = 20;
 const TABLE_MAX: usize = 1 << 25;
 
 /// How many entries of the tables are looked at in the time of one node of a tree search.
-const ENTRIES_PER_NODE: u64 = 256;
+const ENTRIES_PER_NODE: u64 = 1024;
 
 /// The nodes that the tables cost, or none where they do not fit.
 pub(super) fn nodes(problem: &Problem) -> Option<u64> {
@@ -112,42 +112,54 @@ impl<'a> Table<'a> {
 fn share(problem: &Problem, ends: &[Vec<i64>]) -> Option<Vec<usize>> {
     use super::Objective::{Cumulative, MinMax};
     match problem.objective {
-        Cumulative => divide(ends, |(total, latest), end| (total + end, latest.max(end))),
+        Cumulative => {
+            let add = |(total, latest): (i64, i64), end: i64| ((total + end).min(NEVER), latest.max(end));
+            divide(ends, (0, 0), (NEVER, NEVER), add)
+        }
         MinMax => {
             // The latest end first; then, among all plans that keep it, the least sum.
-            let shares = divide(ends, |(latest, _), end| (latest.max(end), 0))?;
+            let shares = divide(ends, 0, NEVER, i64::max)?;
             let latest = shares.iter().zip(ends).map(|(&set, ends)| ends[set]).max().unwrap_or(0);
-            let keeps = |end| if end > latest { NEVER } else { end };
-            divide(ends, |(total, _), end| ((total + keeps(end)).min(NEVER), 0))
+            let add = |total: i64, end: i64| if end > latest { NEVER } else { (total + end).min(NEVER) };
+            divide(ends, 0, NEVER, add)
         }
     }
 }
 
-/// Divides all groups among the vehicles so that the value, which `add` makes larger by a vehicle's end, is least.
-fn divide(ends: &[Vec<i64>], add: impl Fn((i64, i64), i64) -> (i64, i64)) -> Option<Vec<usize>> {
+/// Divides all groups among the vehicles so that the value, which begins at `none` and which `add` makes larger by a vehicle's
+/// end, is least, and below `worst`.
+fn divide<V: Copy + Ord>(
+    ends: &[Vec<i64>],
+    none: V,
+    worst: V,
+    add: impl Fn(V, i64) -> V,
+) -> Option<Vec<usize>> {
     let (sets, last) = (ends[0].len(), ends.len() - 1);
-    let mut values: Vec<_> = ends[0].iter().map(|&end| add((0, 0), end)).collect();
+    let mut values: Vec<_> = ends[0].iter().map(|&end| add(none, end)).collect();
     let mut taken: Vec<Vec<u32>> = vec![(0..sets as u32).collect()];
     for (vehicle, ends) in ends.iter().enumerate().skip(1) {
         // Of the last vehicle only the whole is asked.
         let from = if vehicle == last { sets - 1 } else { 0 };
-        let mut next = vec![((NEVER, NEVER), 0); sets];
-        for (set, best) in next.iter_mut().enumerate().skip(from) {
-            let mut part = set;
+        let (mut next, mut parts) = (vec![worst; sets], vec![0; sets]);
+        for set in from..sets {
+            let (mut best, mut best_part, mut part) = (worst, 0, set);
             loop {
                 let value = add(values[set & !part], ends[part]);
-                *best = (*best).min((value, part as u32));
+                if value <= best {
+                    (best, best_part) = (value, part);
+                }
                 if part == 0 {
                     break;
                 }
                 part = (part - 1) & set;
             }
+            (next[set], parts[set]) = (best, best_part as u32);
         }
-        values = next.iter().map(|(value, _)| *value).collect();
-        taken.push(next.into_iter().map(|(_, part)| part).collect());
+        values = next;
+        taken.push(parts);
     }
     let mut rest = sets - 1;
-    (values[rest].0 < NEVER).then_some(())?;
+    (values[rest] < worst).then_some(())?;
     let mut shares: Vec<_> = taken
         .iter()
         .rev()

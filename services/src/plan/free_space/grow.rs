@@ -9,6 +9,12 @@ const MITRE_MAX_RAD: f64 = 0.7;
 /// Distances below this are not worth cutting corners, in metres.
 const CUT_MIN_M: f64 = 0.1;
 
+/// How many times a small distance sides must be long, …
+const SIDE_MIN: f64 = 20.0;
+
+/// … and how blunt corners, so that all of an outline can be moved at once: turns of up to 120°.
+const BLUNT_MIN_COSINE: f64 = -0.5;
+
 /// Pieces that together cover what lies within a distance of an outline, on its right side: outside of an anticlockwise
 /// one. Never less.
 pub(super) fn right_of(ring: &Ring, distance_m: f64) -> Vec<Ring> {
@@ -28,6 +34,32 @@ pub(super) fn right_of(ring: &Ring, distance_m: f64) -> Vec<Ring> {
         pieces.extend(corner(ring[at], a, before, out, distance_m));
     }
     pieces
+}
+
+/// An outline moved by a small distance to its right (to its left where that is negative), every corner kept: for outlines
+/// of sides that are long and corners that are blunt against the distance, else none.
+pub(super) fn moved(ring: &Ring, distance_m: f64) -> Option<Ring> {
+    if distance_m.abs() >= CUT_MIN_M {
+        return None;
+    }
+    let points: Vec<Point> = ring.iter().map(|&cell| place(cell)).collect();
+    let count = points.len();
+    let normal = |at: usize| {
+        let (a, b) = (points[at % count], points[(at + 1) % count]);
+        let (x, y) = (b.0 - a.0, b.1 - a.1);
+        let length = x.hypot(y);
+        (length > SIDE_MIN * distance_m.abs()).then(|| (y / length, -x / length))
+    };
+    (0..count)
+        .map(|at| {
+            let (before, after) = (normal(at + count - 1)?, normal(at)?);
+            let cosine = before.0 * after.0 + before.1 * after.1;
+            let share = distance_m / (1.0 + cosine);
+            let corner = points[at];
+            let moved = (corner.0 + (before.0 + after.0) * share, corner.1 + (before.1 + after.1) * share);
+            (cosine > BLUNT_MIN_COSINE).then(|| cell(moved))
+        })
+        .collect()
 }
 
 fn plus(a: Point, b: Point) -> Point {

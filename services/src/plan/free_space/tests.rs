@@ -100,11 +100,11 @@ fn ways_are_shortest_and_never_cut_a_zone() {
     let mut random = fastrand::Rng::with_seed(11);
     let (mut found, mut turned, mut apart) = (0, 0, 0);
     for _ in 0..8 {
-        let map = random_map(&mut random, 4, 10_000.0);
+        let map = random_map(&mut random, 4, 5_000.0);
         let Ok(space) = FreeSpace::new(&map, &always()) else { continue };
         let outlines = space.outlines();
         for _ in 0..4 {
-            let mut place = || (random.f64() * 10_000.0, random.f64() * 10_000.0);
+            let mut place = || (random.f64() * 5_000.0, random.f64() * 5_000.0);
             let (start, goal) = (place(), place());
             assert_eq!(space.contains(start), is_free(&outlines, start), "{start:?}");
             if !(is_free(&outlines, start) && is_free(&outlines, goal)) {
