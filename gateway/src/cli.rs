@@ -10,6 +10,7 @@ mod exit;
 mod fleet;
 mod member;
 mod messages;
+mod route;
 mod run;
 mod telemetry;
 mod within;
@@ -60,6 +61,8 @@ enum Command {
     Fleet(fleet::FleetArgs),
     /// Say which vehicle does which task, in which way and order.
     Assign(assign::Assign),
+    /// Find a way around zones, with turns no tighter than the vehicle makes.
+    Route(route::Route),
     /// Measure this machine, side by side with the limit.
     Bench(bench::Bench),
 }
@@ -78,6 +81,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Call(args) => args.run(),
         Command::Fleet(args) => args.run(),
         Command::Assign(args) => args.run(),
+        Command::Route(args) => args.run(),
         Command::Bench(args) => args.run(),
     };
     match done {

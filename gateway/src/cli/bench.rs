@@ -2,6 +2,7 @@
 
 mod bus;
 mod child;
+mod plan;
 mod statistics;
 mod uxas;
 
@@ -10,7 +11,9 @@ use clap::Subcommand;
 
 /// Measure this machine: each figure beside a peer's or the limit's, turn about in the same run.
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json")]
+#[command(
+    after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json\n  aldis bench plan --json"
+)]
 pub(crate) struct Bench {
     #[command(subcommand)]
     what: What,
@@ -22,6 +25,8 @@ enum What {
     Bus(bus::BusBench),
     /// From a UxAS stream through a node to a UxAS stream, against a plain TCP copy.
     Uxas(uxas::UxasBench),
+    /// How good and how fast plans are.
+    Plan(plan::PlanBench),
     /// The other process of `bench bus`.
     #[command(hide = true)]
     BusPeer(bus::BusPeer),
@@ -35,6 +40,7 @@ impl Bench {
         match self.what {
             What::Bus(bench) => bench.run(),
             What::Uxas(bench) => bench.run(),
+            What::Plan(bench) => bench.run(),
             What::BusPeer(peer) => peer.run(),
             What::TcpCopy(copy) => copy.run(),
         }

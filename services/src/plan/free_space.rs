@@ -59,11 +59,20 @@ pub enum RouteEnd {
     Goal,
 }
 
+impl std::fmt::Display for RouteEnd {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Start => "start",
+            Self::Goal => "goal",
+        })
+    }
+}
+
 /// Why there is no way.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RouteError {
     /// An end lies in a zone to keep out of.
-    #[error("the {end:?} lies in keep-out zone {zone}: the nearest way out is at ({:.3}, {:.3}), {distance_m:.3} m away", .nearest.0, .nearest.1)]
+    #[error("the {end} lies in keep-out zone {zone}: the nearest way out is at ({:.3}, {:.3}), {distance_m:.3} m away", .nearest.0, .nearest.1)]
     InKeepOut {
         /// Which end.
         end: RouteEnd,
@@ -75,7 +84,7 @@ pub enum RouteError {
         distance_m: f64,
     },
     /// An end lies outside of all zones to keep in.
-    #[error("the {end:?} lies outside of what vehicles are kept in: the nearest way in is at ({:.3}, {:.3}), {distance_m:.3} m away", .nearest.0, .nearest.1)]
+    #[error("the {end} lies outside of what vehicles are kept in: the nearest way in is at ({:.3}, {:.3}), {distance_m:.3} m away", .nearest.0, .nearest.1)]
     OutsideKeepIn {
         /// Which end.
         end: RouteEnd,
@@ -88,7 +97,7 @@ pub enum RouteError {
     #[error("no way leads from the start to the goal: zones separate them")]
     Disconnected,
     /// A number that is none.
-    #[error("the {0:?} is not a place")]
+    #[error("the {0} is not a place")]
     NotAPlace(RouteEnd),
 }
 

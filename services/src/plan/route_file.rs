@@ -260,7 +260,7 @@ mod tests {
         let mut file: RouteFile = serde_json::from_str(BOAT).unwrap();
         file.start.longitude = 180.0;
         let told = file.plan().unwrap_err().to_string();
-        assert!(told.contains("Start lies in keep-out zone 7") && told.contains("latitude"), "{told}");
+        assert!(told.contains("start lies in keep-out zone 7") && told.contains("latitude"), "{told}");
         file.zones[0].circle = None;
         assert_eq!(file.plan(), Err(RouteFileError::Outline(7)));
         file.goal.latitude = 91.0;

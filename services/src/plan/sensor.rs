@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn footprints_are_those_of_the_reference() {
-        let Some(golden) = crate::plan::golden("sensor_footprint_golden.json") else { return };
+        let Some(golden) = crate::plan::tests::golden("sensor_footprint_golden.json") else { return };
         let cases: Vec<serde_json::Value> = serde_json::from_str(&golden).unwrap();
         assert_eq!(cases.len(), 9);
         for case in cases {

@@ -61,7 +61,7 @@ fn transcript(text: &str, ids: &[i64]) -> String {
 
 #[test]
 fn the_transcripts_of_the_reference_are_the_same() {
-    let Some(golden) = crate::plan::golden("algebra_golden.txt") else { return };
+    let Some(golden) = crate::plan::tests::golden("algebra_golden.txt") else { return };
     let mut same = 0;
     for case in golden.split("=== ").filter(|case| !case.trim().is_empty()) {
         let (head, rest) = case.split_once('\n').unwrap();

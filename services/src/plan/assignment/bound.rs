@@ -8,8 +8,14 @@ use super::arborescence::{Costs, arborescence};
 use super::problem::{NEVER, Part, Problem};
 use super::request::Objective;
 
-/// How often prices are moved.
+/// How often prices are moved at most.
 const ROUNDS: usize = 200;
+
+/// How many ways are looked at in all rounds: of large problems there are fewer rounds, but never fewer than …
+const LOOKS_MAX: usize = 200_000_000;
+
+/// … this.
+const ROUNDS_MIN: usize = 5;
 
 /// Rounds without a better bound after which smaller steps are made.
 const PATIENCE: usize = 12;
@@ -47,7 +53,8 @@ pub(super) fn bound(problem: &Problem, value: i64) -> Option<i64> {
         weight: vec![weight; vehicles],
     };
     let (mut best, mut scale, mut since) = (0.0_f64, 1.0, 0);
-    for _ in 0..ROUNDS {
+    let looks = (vehicles * problem.atoms.len() * problem.atoms.len()).max(1);
+    for _ in 0..(LOOKS_MAX / looks).clamp(ROUNDS_MIN, ROUNDS) {
         let (costs, ways) = priced(problem, &prices);
         let origins = arborescence(&costs)?;
         let sum: f64 =

@@ -11,7 +11,7 @@ fn planned(request: &Request) -> Plan {
 
 /// A case of the reference, by name.
 fn cases() -> BTreeMap<String, Request> {
-    let Some(text) = crate::plan::golden("assignment_semantics.json") else { return BTreeMap::new() };
+    let Some(text) = crate::plan::tests::golden("assignment_semantics.json") else { return BTreeMap::new() };
     let cases: Vec<serde_json::Value> = serde_json::from_str(&text).unwrap();
     assert_eq!(cases.len(), 16);
     let request = |case: serde_json::Value| {

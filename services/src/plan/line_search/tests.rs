@@ -21,7 +21,7 @@ fn same(ours: &[Point], theirs: &serde_json::Value, what: &str) {
 
 #[test]
 fn shapes_are_those_of_the_reference() {
-    let Some(golden) = crate::plan::golden("dpss_golden.txt") else { return };
+    let Some(golden) = crate::plan::tests::golden("dpss_golden.txt") else { return };
     let lines: Vec<_> = golden.lines().collect();
     assert_eq!(lines.len(), 12);
     for case in lines.chunks_exact(2) {
@@ -57,7 +57,7 @@ fn river() -> Vec<(f64, f64)> {
 
 #[test]
 fn the_river_costs_what_the_reference_found() {
-    let Some(golden) = crate::plan::golden("waterway_today_golden.json") else { return };
+    let Some(golden) = crate::plan::tests::golden("waterway_today_golden.json") else { return };
     let golden: serde_json::Value = serde_json::from_str(&golden).unwrap();
     let river = river();
     assert_eq!(river.len(), 90);

@@ -66,7 +66,7 @@ fn truncated(route: &Route, map: &Map) -> i64 {
 
 #[test]
 fn maps_are_those_of_the_reference_or_repaired() {
-    let Some(golden) = crate::plan::golden("visibility_golden.json") else { return };
+    let Some(golden) = crate::plan::tests::golden("visibility_golden.json") else { return };
     let golden: Value = serde_json::from_str(&golden).unwrap();
     let cases = golden.as_object().unwrap();
     assert_eq!(cases.len(), 8);
