@@ -1,6 +1,7 @@
 //! The command line.
 
 mod allocation;
+mod assign;
 mod bench;
 mod call;
 mod check;
@@ -18,6 +19,7 @@ mod publish;
 mod record;
 mod replay;
 mod retained;
+mod route;
 mod run;
 mod subscribe;
 mod telemetry;
@@ -87,6 +89,10 @@ enum Command {
     Log(log::LogArgs),
     /// Read, write and check LMCP messages in files.
     Lmcp(lmcp::Lmcp),
+    /// Say which vehicle does which task, in which way and order.
+    Assign(assign::Assign),
+    /// Find a way around zones, with turns no tighter than the vehicle makes.
+    Route(route::Route),
     /// Measure this machine, side by side with the limit.
     Bench(bench::Bench),
 }
@@ -114,6 +120,8 @@ pub(crate) fn main() -> ExitCode {
         Command::Health(args) => args.run(),
         Command::Log(args) => args.run(),
         Command::Lmcp(args) => args.run(),
+        Command::Assign(args) => args.run(),
+        Command::Route(args) => args.run(),
         Command::Bench(args) => args.run(),
     };
     match done {

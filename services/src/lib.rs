@@ -19,6 +19,7 @@ pub mod log;
 pub mod map;
 pub mod node;
 pub mod notes;
+pub mod plan;
 pub mod registry;
 pub mod service;
 pub mod sim;

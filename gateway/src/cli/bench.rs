@@ -5,6 +5,7 @@ mod child;
 mod join;
 mod journal;
 mod lmcp;
+mod plan;
 mod service_node;
 mod statistics;
 mod umaa;
@@ -16,7 +17,7 @@ use clap::Subcommand;
 /// Measure this machine: each figure beside a peer's or the limit's, turn about in the same run.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json\n  aldis bench lmcp --json\n  aldis bench join --instances 10000 --rate 1000 --json\n  aldis bench umaa --json\n  aldis bench journal --json"
+    after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json\n  aldis bench lmcp --json\n  aldis bench join --instances 10000 --rate 1000 --json\n  aldis bench umaa --json\n  aldis bench journal --json\n  aldis bench plan --json"
 )]
 pub(crate) struct Bench {
     #[command(subcommand)]
@@ -40,6 +41,8 @@ enum What {
     UmaaPeer(umaa::UmaaPeer),
     /// Records on disk a second, against plain writes and syncs; restarts.
     Journal(journal::JournalBench),
+    /// How good and how fast plans are.
+    Plan(plan::PlanBench),
     /// The other process of `bench bus`.
     #[command(hide = true)]
     BusPeer(bus::BusPeer),
@@ -65,6 +68,7 @@ impl Bench {
             What::Umaa(bench) => bench.run(),
             What::UmaaPeer(peer) => peer.run(),
             What::Journal(bench) => bench.run(),
+            What::Plan(bench) => bench.run(),
             What::BusPeer(peer) => peer.run(),
             What::TcpCopy(copy) => copy.run(),
             What::JournalPeer(peer) => peer.run(),

@@ -16,7 +16,7 @@ const PACKAGES: [(&str, &[&str]); 3] = [
 const LAYERS: [&[&str]; 8] = [
     &["service"],
     &["allow", "calls", "counters", "dds", "event", "journal", "notes", "streams"],
-    &["link", "map", "umaa"],
+    &["link", "map", "plan", "umaa"],
     &["bridge", "labels"],
     &["conform", "health", "log", "track"],
     &["host", "registry"],
