@@ -76,7 +76,8 @@ enum Command {
     /// Show or set who may control which resource.
     Priority(allocation::Priority),
     /// Follow UMAA commands.
-    Command(command::CommandArgs),
+    #[command(name = "command")]
+    Flow(command::CommandArgs),
     /// Watch UMAA traffic and report what of the ICD was held and broken.
     Conform(conform::Conform),
     /// Record envelopes into a file.
@@ -113,7 +114,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Allocate(args) => args.run(),
         Command::Release(args) => args.run(),
         Command::Priority(args) => args.run(),
-        Command::Command(args) => args.run(),
+        Command::Flow(args) => args.run(),
         Command::Conform(args) => args.run(),
         Command::Record(args) => args.run(),
         Command::Replay(args) => args.run(),

@@ -13,6 +13,10 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::time::{Duration, Instant};
 
+/// How long after joining what comes is still taken for history. Topics are repaired each on its own, so that what one of them
+/// said before the monitor came may reach it after what another said later.
+const SETTLING: Duration = Duration::from_secs(1);
+
 /// How many instances are remembered with their writers, to tell when those have vanished.
 const INSTANCES_MAX: usize = 100_000;
 
@@ -59,7 +63,7 @@ enum Format {
 struct Watching {
     monitor: Arc<Mutex<Option<Monitor>>>,
     decoder: Decoder,
-    has_history: bool,
+    judges_from: Option<Monotonic>,
     written: BTreeMap<Source, BTreeSet<(String, KeyHash)>>,
     instances: usize,
     tell: mpsc::Sender<Told>,
@@ -81,7 +85,8 @@ impl Watching {
 
     fn message(&mut self, now: Now, envelope: &Envelope) {
         let Some(observation) = self.decoder.observation(now.monotonic, envelope) else { return };
-        let observation = Observation { retained: !self.has_history, ..observation };
+        let retained = self.judges_from.is_none_or(|from| now.monotonic < from);
+        let observation = Observation { retained, ..observation };
         let of_writer = self.written.entry(observation.writer).or_default();
         let id = (observation.topic.clone(), observation.instance);
         match observation.observed {
@@ -121,7 +126,7 @@ impl Desk for Watching {
                 // The command no longer listens where it has been cut off.
                 let _ = self.tell.send(Told::Joined);
             }
-            Input::HistoryComplete(_) => self.has_history = true,
+            Input::HistoryComplete(_) => self.judges_from = Some(now.monotonic + SETTLING),
             Input::Message(envelope) if envelope.message.call.is_none() => self.message(now, envelope),
             Input::Token(writer, false) => self.vanished(now, writer),
             _ => {}
@@ -153,7 +158,7 @@ impl Conform {
         let desk = Watching {
             monitor: shared.clone(),
             decoder: Decoder::new([]),
-            has_history: false,
+            judges_from: None,
             written: BTreeMap::new(),
             instances: 0,
             tell: tell.clone(),

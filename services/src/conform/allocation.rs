@@ -144,7 +144,7 @@ impl Allocations {
             ALLOCATION if is_terminal(&step.to) => self.ended(step, ledger),
             PRIORITY if step.to == "COMPLETED" => self.prioritized(step, command, ledger),
             ALLOCATION | PRIORITY => {}
-            _ if step.to == "EXECUTING" => self.guarded(step, command, ledger),
+            _ if step.to == "EXECUTING" && !step.retained => self.guarded(step, command, ledger),
             _ => {}
         }
     }
@@ -155,6 +155,25 @@ impl Allocations {
             return;
         };
         let holder = Holder { arbiter: step.provider, resource, consumer };
+        if !step.retained {
+            self.judge_allocation(step, &holder, ledger);
+        }
+        // The control that ended goes on with this session.
+        ledger.forgive(&debt(Clause::ReportCleared, resource, consumer));
+        let expiry = debt(Clause::Expiry, resource, step.session);
+        ledger.forgive(&expiry);
+        if let Some(seconds) = command.value()["duration"].as_f64()
+            && let Ok(duration) = Duration::try_from_secs_f64(seconds)
+        {
+            let text = format!("resource {resource}: control of {consumer} did not end after {seconds} s");
+            ledger.owe(expiry, duration + ledger.bounds.answer, text);
+        }
+        self.executing.insert(step.session, holder);
+    }
+
+    /// Whether control is given as it should be.
+    fn judge_allocation(&mut self, step: &Step, holder: &Holder, ledger: &mut Ledger) {
+        let Holder { resource, consumer, .. } = *holder;
         let other =
             self.executing.values().find(|other| other.resource == resource && other.consumer != consumer);
         ledger.judge(Clause::OneHolder, other.is_none(), || {
@@ -183,18 +202,6 @@ impl Allocations {
         ledger.judge(Clause::ReportFirst, told == Some(consumer), || {
             format!("resource {resource} is given to {consumer} when the report names {told:?}")
         });
-
-        // The control that ended goes on with this session.
-        ledger.forgive(&debt(Clause::ReportCleared, resource, consumer));
-        let expiry = debt(Clause::Expiry, resource, step.session);
-        ledger.forgive(&expiry);
-        if let Some(seconds) = command.value()["duration"].as_f64()
-            && let Ok(duration) = Duration::try_from_secs_f64(seconds)
-        {
-            let text = format!("resource {resource}: control of {consumer} did not end after {seconds} s");
-            ledger.owe(expiry, duration + ledger.bounds.answer, text);
-        }
-        self.executing.insert(step.session, holder);
     }
 
     /// An allocation is over.

@@ -47,6 +47,8 @@ pub(super) struct Step {
     pub(super) command: Option<Sample>,
     pub(super) to: String,
     pub(super) reason: String,
+    /// Whether it is history: what came before it may not be known.
+    pub(super) retained: bool,
 }
 
 /// Family, session, provider.

@@ -63,6 +63,10 @@ fn who_is_not_in_the_priorities_is_rejected_until_they_are_set() {
 fn a_higher_priority_takes_over_and_a_lower_one_does_not() {
     let site = Site::new();
     let _nodes = start(&site);
+    until("the arbiter reports its resource", || {
+        let done = site.aldis(&["priority", "--json"]);
+        done.json().first().filter(|line| line["priorities"].as_array().unwrap().len() == 2).map(drop)
+    });
     thread::scope(|scope| {
         let watching = scope.spawn(|| site.aldis(&["conform", "--for", "25s", "--json"]));
         let lower = scope.spawn(|| site.aldis(&["allocate", "400:autopilot", "--json"]));

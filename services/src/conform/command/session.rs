@@ -209,7 +209,7 @@ impl Session {
         self.ended = is_terminal(&to).then_some(ledger.now());
         self.after(&to, retained, ledger);
         let (family, session, provider) = self.id.clone();
-        Some(Step { family, provider, session, command: self.command.clone(), to, reason })
+        Some(Step { family, provider, session, command: self.command.clone(), to, reason, retained })
     }
 
     fn transition(&self, to: &str, reason: &str, ledger: &mut Ledger) {
