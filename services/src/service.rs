@@ -37,7 +37,8 @@ pub enum Input<'a> {
     Started,
     /// A message that it subscribed to or that is addressed to it; requests and replies of calls too.
     Message(&'a Envelope),
-    /// A retained sample of its own, from a former life of this service: it comes right after the start.
+    /// A retained sample of its own, from a former life of this service: it comes right after the start, where something
+    /// keeps samples over restarts. The node does not yet: it is not joined to the journal.
     Recovered(&'a Envelope),
     /// What others retain for its subscriptions has come, as far as it is to be had: true where every node that is known
     /// has told all of it, false where one has not in time or no other node is known. Comes once after each start; what comes later is news.

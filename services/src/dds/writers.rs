@@ -350,11 +350,6 @@ impl Writers {
         (reminders, confirmed)
     }
 
-    /// The participants whose readers are known.
-    pub fn participants(&self) -> impl Iterator<Item = Participant> + '_ {
-        self.readers.keys().copied()
-    }
-
     /// Whether a participant's readers are known.
     pub fn knows(&self, participant: Participant) -> bool {
         self.readers.contains_key(&participant)
