@@ -1,6 +1,7 @@
 //! The bus: the only place that knows Zenoh.
 
 mod inbox;
+mod outlet;
 mod session;
 
 pub(crate) use inbox::{Direct, Inbox};

@@ -16,7 +16,7 @@ use crate::host::Hosted;
 use crate::labels::Labels;
 use crate::notes::Notes;
 use crate::registry;
-use crate::service::{Component, ComponentHealth, Condition, Input, Level, ServiceSpec};
+use crate::service::{Action, Component, ComponentHealth, Condition, Input, Level, ServiceSpec};
 use crate::streams::{Inbound, Outbound};
 use aldis_envelope::{
     Address, BootId, EntityId, Fleet, KeyHash, Keys, Label, Message, Monotonic, Now, Prefix, Priority,
@@ -100,6 +100,8 @@ pub struct Node {
     waiting_calls: Vec<(usize, Message)>,
     /// Services with wishes in their outboxes.
     awake: VecDeque<usize>,
+    /// Kept for its memory.
+    actions: Vec<Action>,
     /// Who receives what has changed: the labels are to be judged anew before the next message.
     labels_are_stale: bool,
     subscriptions: Vec<String>,
@@ -147,6 +149,7 @@ impl Node {
             work: VecDeque::new(),
             waiting_calls: Vec::new(),
             awake: VecDeque::new(),
+            actions: Vec::new(),
             labels_are_stale: false,
             subscriptions: Vec::new(),
             bus_is_open: false,

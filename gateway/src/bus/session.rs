@@ -1,17 +1,19 @@
 //! One session on the bus, and all that is declared on it.
 
 use super::Inbox;
-use aldis_envelope::codec::native::{encode, encode_variable};
+use super::outlet::Outlet;
+use aldis_envelope::codec::native::encode;
 use aldis_envelope::{Change, Envelope, Keys, Priority, Source};
 use aldis_services::{Event, PublisherId};
 use bytes::Bytes;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 use zenoh::bytes::ZBytes;
 use zenoh::key_expr::KeyExpr;
 use zenoh::liveliness::LivelinessToken;
-use zenoh::pubsub::{Publisher, Subscriber};
+use zenoh::pubsub::Subscriber;
 use zenoh::qos::CongestionControl;
 use zenoh::sample::{Locality, Sample, SampleKind};
 use zenoh::{Session, Wait};
@@ -34,13 +36,8 @@ pub(crate) struct BusError {
     why: String,
 }
 
-fn failed<E: std::fmt::Display>(doing: &'static str) -> impl Fn(E) -> BusError {
+pub(super) fn failed<E: std::fmt::Display>(doing: &'static str) -> impl Fn(E) -> BusError {
     move |why| BusError { doing, why: why.to_string() }
-}
-
-struct Declared {
-    publisher: Publisher<'static>,
-    constant: Vec<u8>,
 }
 
 /// A session on the bus.
@@ -49,10 +46,12 @@ pub(crate) struct Bus {
     keys: Keys,
     inbox: Arc<Inbox>,
     congestion: CongestionControl,
-    publishers: Vec<Option<Declared>>,
+    publishers: Vec<Option<Outlet>>,
     subscribers: BTreeMap<String, Subscriber<()>>,
     tokens: BTreeMap<Source, LivelinessToken>,
     learned: Vec<KeyExpr<'static>>,
+    /// How often who is there has changed.
+    changes: Arc<AtomicU64>,
     _alive: Option<Subscriber<()>>,
 }
 
@@ -76,6 +75,7 @@ impl Bus {
             subscribers: BTreeMap::new(),
             tokens: BTreeMap::new(),
             learned: Vec::new(),
+            changes: Arc::default(),
             _alive: None,
         })
     }
@@ -88,11 +88,15 @@ impl Bus {
                 inbox.event(Event::Alive(parsed.source, sample.kind() == SampleKind::Put));
             }
         };
-        let (inbox, keys) = (self.inbox.clone(), self.keys.clone());
+        let (inbox, keys, changes) = (self.inbox.clone(), self.keys.clone(), self.changes.clone());
         let liveliness = self.session.liveliness();
         let subscriber = liveliness
             .declare_subscriber(self.keys.every_alive())
-            .callback(move |sample| tell(&inbox, &keys, &sample))
+            .callback(move |sample| {
+                // Counted before it is told: who answers to the news is heard.
+                changes.fetch_add(1, Ordering::Relaxed);
+                tell(&inbox, &keys, &sample);
+            })
             .wait()
             .map_err(failed(doing))?;
         let (keys, told) = (self.keys.clone(), Told(self.inbox.clone()));
@@ -150,23 +154,16 @@ impl Bus {
         if self.publishers.len() <= id.0 {
             self.publishers.resize_with(id.0 + 1, || None);
         }
-        self.publishers[id.0] = Some(Declared { publisher, constant });
+        self.publishers[id.0] = Some(Outlet::new(publisher, constant)?);
         Ok(())
     }
 
-    /// Puts an envelope with a prepared publisher.
-    pub(crate) fn publish(&self, id: PublisherId, envelope: Envelope) -> Result<(), BusError> {
-        let Some(Some(declared)) = self.publishers.get(id.0) else {
-            return Err(failed("publish")("the publisher was not declared"));
-        };
-        let mut header = Vec::with_capacity(declared.constant.len() + 48);
-        header.extend_from_slice(&declared.constant);
-        encode_variable(&envelope.message, &envelope.stamp, &mut header);
-        let put = match envelope.message.change {
-            Change::Dispose => declared.publisher.delete().attachment(header).wait(),
-            _ => declared.publisher.put(ZBytes::from(envelope.message.content)).attachment(header).wait(),
-        };
-        put.map_err(failed("publish"))
+    /// Puts an envelope with a prepared publisher, where anybody listens.
+    pub(crate) fn publish(&mut self, id: PublisherId, envelope: Envelope) -> Result<(), BusError> {
+        match self.publishers.get_mut(id.0) {
+            Some(Some(outlet)) => outlet.put(envelope, &self.changes),
+            _ => Err(failed("publish")("the publisher was not declared")),
+        }
     }
 
     /// Puts an envelope on a key without a publisher.

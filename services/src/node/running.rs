@@ -64,8 +64,10 @@ impl Node {
 
     fn take_actions(&mut self, now: Now, place: usize, effects: &mut Vec<Effect>) {
         let source = self.services[place].spec.source;
-        let actions: Vec<_> = self.services[place].actions().collect();
-        for action in actions {
+        // Its memory is kept: a message a round would otherwise cost an allocation.
+        let mut actions = std::mem::take(&mut self.actions);
+        actions.extend(self.services[place].actions());
+        for action in actions.drain(..) {
             match action {
                 Action::Send(message) => self.take_message(now, source, work(place, message), effects),
                 Action::SendConfirmed(message, number, within) => {
@@ -86,6 +88,7 @@ impl Node {
                 }
             }
         }
+        self.actions = actions;
     }
 
     fn take_message(&mut self, now: Now, source: Source, work: Work, effects: &mut Vec<Effect>) {
