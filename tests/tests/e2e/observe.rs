@@ -1,6 +1,6 @@
 //! What people ask of a running fleet: health, log, recordings; and what a late joiner gets.
 
-use aldis_tests::{Site, aldis, until};
+use aldis_tests::{Node, Site, aldis, until};
 use std::thread;
 
 #[test]
@@ -87,6 +87,32 @@ fn a_recording_is_replayed_as_it_was() {
     let replayed = elsewhere.aldis(&["replay", short.to_str().unwrap(), "--json"]);
     assert!(replayed.stderr.contains("ends inside the record"), "{replayed:?}");
     assert_eq!(replayed.json()[0]["sent"], 5);
+}
+
+#[test]
+fn a_publisher_that_nobody_listened_to_is_heard_by_who_comes_and_comes_again() {
+    let site = Site::new();
+    // Without a bridge nobody but the subscribers of this test listens.
+    let config = format!(
+        "name = \"quiet\"\nfleet = \"fleet\"\nentities = [1]\n[bus]\nmode = \"router\"\nlisten = [\"tcp/127.0.0.1:{}\"]\n",
+        site.bus
+    );
+    let _node = Node::start(&site.directory().write("quiet.toml", &config));
+    site.wait_for(1);
+    thread::scope(|scope| {
+        scope.spawn(|| {
+            let what = ["pub", "weather", "--content-type", "text", "--text", "calm"];
+            site.aldis(&[&what[..], &["--rate", "200", "--count", "2000"]].concat())
+        });
+        // Each count takes longer than the second for which a publisher sends whatever it knows of listeners.
+        for round in 0..2 {
+            let heard = site.aldis(&["sub", "weather", "--count", "300", "--json", "--as", "9001"]).json();
+            let numbers: Vec<_> =
+                heard.iter().map(|envelope| envelope["sequence"].as_u64().unwrap()).collect();
+            assert_eq!(numbers.len(), 300, "round {round}");
+            assert!(numbers.windows(2).all(|pair| pair[1] == pair[0] + 1), "round {round}: {numbers:?}");
+        }
+    });
 }
 
 #[test]
