@@ -32,8 +32,26 @@ pub(crate) struct Entry {
     pub(crate) outgoing: Option<usize>,
     /// Its place among the incoming streams of a node, once it was heard.
     pub(crate) incoming: Option<(EntityId, Option<usize>)>,
-    /// Publishers by instance; none where an instance was written once.
-    pub(crate) publishers: BTreeMap<Option<KeyHash>, Option<PublisherId>>,
+    /// What is known of the keys of its instances.
+    pub(crate) publishers: BTreeMap<Option<KeyHash>, Standing>,
+}
+
+/// How the key of an instance stands.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Standing {
+    /// It was put on so often, undeclared.
+    Used(u32),
+    /// It has a publisher.
+    Declared(PublisherId),
+}
+
+impl Entry {
+    /// An instance has ended: where its key has no publisher, the place of its count is free.
+    pub(crate) fn forget_rare(&mut self, instance: Option<KeyHash>) {
+        if let Some(Standing::Used(_)) = self.publishers.get(&instance) {
+            self.publishers.remove(&instance);
+        }
+    }
 }
 
 /// All labels met.

@@ -50,6 +50,9 @@ impl Shared {
 /// would never do; so Zenoh's thread, which must go on taking, does not put when much goes out.
 const QUIET: Duration = Duration::from_micros(20);
 
+/// So many puts of one turn go out on a callback: a command is answered with a handful of samples.
+const PUTS_ON_CALLBACK_MAX: u32 = 8;
+
 /// On whose thread effects are carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum On {
@@ -66,6 +69,8 @@ pub(crate) struct Core {
     deferred: VecDeque<Effect>,
     wake: Arc<Notify>,
     last_out: Option<Monotonic>,
+    /// How many puts a callback may still make in this turn.
+    puts_left: u32,
     clock: Clock,
     /// Kept for their memory.
     events: Vec<Event>,
@@ -98,6 +103,7 @@ impl Core {
             deferred: VecDeque::new(),
             wake: wake.clone(),
             last_out: None,
+            puts_left: 0,
             clock,
             events: Vec::new(),
             effects,
@@ -164,6 +170,7 @@ impl Core {
             let now = self.clock.now();
             let mut effects = std::mem::take(&mut self.effects);
             self.node.handle(now, events, &mut effects);
+            self.puts_left = if self.is_quiet(now.monotonic) { PUTS_ON_CALLBACK_MAX } else { 0 };
             for effect in effects.drain(..) {
                 self.carry_out(now.monotonic, effect, on, events);
             }
@@ -194,7 +201,8 @@ impl Core {
             Effect::Exit => {
                 self.exited.send_replace(true);
             }
-            bus if on == On::Loop || self.may_put_here(now, &bus) => {
+            bus if on == On::Loop || self.may_put_here(&bus) => {
+                self.puts_left = self.puts_left.saturating_sub(1);
                 self.last_out = Some(now);
                 self.carry_out_on_bus(bus, events);
             }
@@ -210,8 +218,9 @@ impl Core {
     }
 
     /// Whether a callback may do this on the bus itself: it never declares, and puts only while little goes out.
-    fn may_put_here(&self, now: Monotonic, effect: &Effect) -> bool {
-        self.deferred.is_empty() && matches!(effect, Effect::Publish(..)) && self.is_quiet(now)
+    fn may_put_here(&self, effect: &Effect) -> bool {
+        let puts = matches!(effect, Effect::Publish(..) | Effect::PublishOn(..));
+        puts && self.puts_left > 0 && self.deferred.is_empty()
     }
 
     fn carry_out_on_bus(&mut self, effect: Effect, events: &mut Vec<Event>) {

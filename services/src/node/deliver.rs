@@ -3,7 +3,7 @@
 use super::{Node, Origin, Work, sharing};
 use crate::dds::Step;
 use crate::event::{BridgeId, Effect, PeerId, PublisherId};
-use crate::labels::Entry;
+use crate::labels::{Entry, Standing};
 use crate::service::{Input, Level, refusal};
 use aldis_envelope::{
     Address, Call, Change, Envelope, KeyHash, Label, Now, Priority, Refusal, Role, ServiceId, Space, Stamp,
@@ -13,6 +13,9 @@ use std::sync::Arc;
 
 /// How many publishers are declared at the most: Zenoh keeps a route for each. Rarer keys are put on undeclared.
 pub(super) const PUBLISHERS_MAX: usize = 2_000;
+/// An instance gets a publisher with its use after so many: the instances of a command live for a handful, and to declare
+/// and keep a key for each costs more than it brings.
+const INSTANCE_USES_MIN: u32 = 8;
 /// How many instances of one stream get a publisher. Zenoh looks a key that is not declared up among all that are, so that
 /// a topic of thousands of instances is faster with few.
 const INSTANCE_PUBLISHERS_MAX: usize = 64;
@@ -252,6 +255,9 @@ impl Node {
         let plain = hash.is_none() || label.is_broadcast();
         let publisher =
             if plain && !on_a_writer_key { self.publisher(place, &label, hash, effects) } else { None };
+        if change == Change::Dispose {
+            self.labels.entry(place).forget_rare(hash);
+        }
         match publisher {
             Some(publisher) => effects.push(Effect::Publish(publisher, envelope)),
             None => {
@@ -262,8 +268,8 @@ impl Node {
         }
     }
 
-    /// The publisher of a label and instance; none when there are too many. That of an instance is declared at its second
-    /// use: thousands at once, as at a start, would hold the node up.
+    /// The publisher of a label and instance; none when there are too many, or where an instance was used too rarely:
+    /// thousands declared at once, as at a start, would hold the node up.
     fn publisher(
         &mut self,
         place: usize,
@@ -272,11 +278,15 @@ impl Node {
         effects: &mut Vec<Effect>,
     ) -> Option<PublisherId> {
         let own = &mut self.labels.entry(place).publishers;
-        match own.get(&instance) {
-            Some(Some(known)) => return Some(*known),
+        match own.get_mut(&instance) {
+            Some(Standing::Declared(known)) => return Some(*known),
+            Some(Standing::Used(uses)) if *uses < INSTANCE_USES_MIN => {
+                *uses += 1;
+                return None;
+            }
             None if instance.is_some() => {
                 if own.len() < INSTANCE_PUBLISHERS_MAX {
-                    own.insert(instance, None);
+                    own.insert(instance, Standing::Used(1));
                 }
                 return None;
             }
@@ -293,7 +303,7 @@ impl Node {
                 next
             }
         };
-        self.labels.entry(place).publishers.insert(instance, Some(publisher));
+        self.labels.entry(place).publishers.insert(instance, Standing::Declared(publisher));
         Some(publisher)
     }
 

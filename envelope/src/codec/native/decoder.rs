@@ -14,10 +14,14 @@ use crate::time::Wall;
 use bytes::Bytes;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// How many keys and labels a decoder remembers. A fleet of 100 vehicles with 40 streams each stays below; beyond it
 /// the memory is forgotten whole, which costs time but nothing else.
 const REMEMBERED_MAX: usize = 8_192;
+
+/// A key counts as learned with so many samples: the instances of a command live for a handful, and are better left alone.
+const LEARNED_AFTER: u32 = 8;
 
 /// How many keys of one label count as learned: those of a topic with more instances than this are better left alone.
 const LEARNED_OF_LABEL_MAX: u32 = 64;
@@ -27,7 +31,7 @@ const LEARNED_OF_LABEL_MAX: u32 = 64;
 pub struct Decoder {
     keys: Keys,
     known: BTreeMap<Arc<str>, Arc<Known>>,
-    /// With the number of keys known of each.
+    /// With the number of keys learned of each.
     labels: BTreeMap<Arc<Label>, u32>,
     last: Option<(Arc<str>, Arc<Known>)>,
     learned: bool,
@@ -43,6 +47,8 @@ struct Known {
     priority: Priority,
     space: Space,
     instance: Option<Arc<Instance>>,
+    /// How many samples came, up to [`LEARNED_AFTER`].
+    samples: AtomicU32,
 }
 
 impl Decoder {
@@ -75,7 +81,7 @@ impl Decoder {
         }
     }
 
-    /// Whether a key was met for the first time since this was last asked, and is one of few of its label.
+    /// Whether the key of the last sample has come often enough to be declared, and is one of few of its label.
     pub fn take_learned(&mut self) -> bool {
         std::mem::take(&mut self.learned)
     }
@@ -85,7 +91,9 @@ impl Decoder {
             && **last == *key
             && header.starts_with(&known.constant)
         {
-            return Ok(known.clone());
+            let known = known.clone();
+            self.count(&known);
+            return Ok(known);
         }
         let remembered =
             self.known.get_key_value(key).filter(|(_, known)| header.starts_with(&known.constant));
@@ -94,7 +102,22 @@ impl Decoder {
             None => self.learn(key, header)?,
         };
         self.last = Some((key, known.clone()));
+        self.count(&known);
         Ok(known)
+    }
+
+    fn count(&mut self, known: &Known) {
+        // Not shared: the decoder alone counts, and is borrowed by whoever has it do so.
+        let samples = known.samples.load(Ordering::Relaxed);
+        if samples >= LEARNED_AFTER {
+            return;
+        }
+        known.samples.store(samples + 1, Ordering::Relaxed);
+        if samples + 1 == LEARNED_AFTER {
+            let of_label = self.labels.entry(known.label.clone()).or_default();
+            *of_label += 1;
+            self.learned |= *of_label <= LEARNED_OF_LABEL_MAX;
+        }
     }
 
     fn learn(&mut self, key: &str, header: &[u8]) -> Result<(Arc<str>, Arc<Known>), HeaderError> {
@@ -111,11 +134,8 @@ impl Decoder {
             known.label = label.clone();
         }
         let (key, known): (Arc<str>, _) = (key.into(), Arc::new(known));
-        if self.known.insert(key.clone(), known.clone()).is_none() {
-            let of_label = self.labels.entry(known.label.clone()).or_default();
-            *of_label += 1;
-            self.learned |= *of_label <= LEARNED_OF_LABEL_MAX;
-        }
+        self.known.insert(key.clone(), known.clone());
+        self.labels.entry(known.label.clone()).or_default();
         Ok((key, known))
     }
 }
@@ -161,7 +181,16 @@ fn read_constant(key: &ParsedKey<'_>, header: &[u8]) -> Result<Known, HeaderErro
     let attributes = Attributes { content_type, descriptor, source_group, source: key.source };
     let label = Arc::new(Label { address, attributes });
     let instance = key.instance.map(|hash| Arc::new(Instance { hash, key: None }));
-    Ok(Known { constant, label, node, boot, priority, space: key.space, instance })
+    Ok(Known {
+        constant,
+        label,
+        node,
+        boot,
+        priority,
+        space: key.space,
+        instance,
+        samples: AtomicU32::new(0),
+    })
 }
 
 fn read_stamp(known: &Known, rest: &mut Reader<'_>) -> Result<Stamp, HeaderError> {
