@@ -11,6 +11,7 @@ pub mod free_space;
 pub mod geodesy;
 pub mod line_search;
 pub mod pattern_search;
+pub mod roads;
 pub mod route_file;
 pub mod search_plan;
 pub mod sensor;
