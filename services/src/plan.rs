@@ -4,12 +4,16 @@
 //! so that a plan depends on its request alone.
 
 pub mod algebra;
+pub mod area_search;
 pub mod assignment;
 pub mod flat_earth;
 pub mod free_space;
 pub mod geodesy;
 pub mod line_search;
+pub mod pattern_search;
+pub mod roads;
 pub mod route_file;
+pub mod search_plan;
 pub mod sensor;
 pub mod turning;
 

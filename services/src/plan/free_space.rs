@@ -5,7 +5,7 @@
 //! space or on its border, without exception. Places are in metres on a plane.
 
 mod fallback;
-mod grid;
+pub(in crate::plan) mod grid;
 mod grow;
 pub mod instance;
 mod locate;
@@ -141,12 +141,7 @@ impl FreeSpace {
         let mut keep_out = Vec::new();
         let mut within: [Vec<Ring>; 2] = [Vec::new(), Vec::new()];
         for zone in zones {
-            let corners = zone::corners(zone)?;
-            let ring: Ring = corners.into_iter().map(grid::cell).collect();
-            let outline = grid::union(&[grid::anticlockwise(ring)]);
-            if outline.is_empty() {
-                return Err(SpaceError::Zone { zone: zone.id, what: "its outline has no area".to_owned() });
-            }
+            let outline = outline(zone)?;
             let room = zone.padding_m + hair_m;
             match zone.kind {
                 ZoneKind::KeepOut => keep_out.push((zone.id, grown(outline, room))),
@@ -179,6 +174,11 @@ impl FreeSpace {
     /// The outlines of free space, each with free space to its left.
     pub fn outlines(&self) -> Vec<Vec<Point>> {
         self.rings.iter().map(|ring| ring.iter().map(|&cell| grid::place(cell)).collect()).collect()
+    }
+
+    /// The same on the grid.
+    pub(in crate::plan) fn rings(&self) -> &[Ring] {
+        &self.rings
     }
 
     /// How many corners its outlines have.
@@ -271,6 +271,16 @@ impl FreeSpace {
         }
         best
     }
+}
+
+/// The outlines of a zone on the grid, without its padding.
+pub(in crate::plan) fn outline(zone: &Zone) -> Result<Vec<Ring>, SpaceError> {
+    let ring: Ring = zone::corners(zone)?.into_iter().map(grid::cell).collect();
+    let outline = grid::union(&[grid::anticlockwise(ring)]);
+    if outline.is_empty() {
+        return Err(SpaceError::Zone { zone: zone.id, what: "its outline has no area".to_owned() });
+    }
+    Ok(outline)
 }
 
 /// Outlines with room around them.

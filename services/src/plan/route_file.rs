@@ -1,7 +1,13 @@
 //! A request for a route as a file holds it, in degrees, and its answer.
 
+mod on_roads;
+#[cfg(test)]
+mod tests;
+mod turn;
+
 use super::free_space::{Boundary, Conditions, FreeSpace, Point, RouteError, SpaceError, Zone, ZoneKind};
 use super::geodesy::{Place, Plane};
+use super::roads::RoadError;
 use super::turning::{Piece, Pose, TurningError, TurningSpace};
 use serde::Deserialize;
 
@@ -21,6 +27,17 @@ pub struct RouteFile {
     pub zones: Vec<ZoneRow>,
     /// The radius of the tightest turn, in metres; without one, or without headings, the vehicle turns on the spot.
     pub turn_radius_m: Option<f64>,
+    /// How fast it is, in metres a second: with a bank angle or a yaw rate, that gives the radius of the turn.
+    pub speed_m_per_s: Option<f64>,
+    /// How far an aircraft banks in turns, in degrees.
+    pub bank_angle_deg: Option<f64>,
+    /// How fast a vessel turns, in degrees a second.
+    pub yaw_rate_deg_per_s: Option<f64>,
+    /// For ground vehicles: the file of the roads that they keep to, in OpenStreetMap's XML.
+    pub roads: Option<String>,
+    /// Whether they drive one-way roads both ways.
+    #[serde(default)]
+    pub ignore_one_way: bool,
     /// The vehicle, for zones that concern some.
     #[serde(default)]
     pub vehicle: i64,
@@ -101,6 +118,12 @@ pub enum RouteFileError {
     /// A place that is none.
     #[error("{0}: latitude {1}, longitude {2} is not a place")]
     Place(String, f64, f64),
+    /// A turn that is none.
+    #[error("{0}")]
+    Turn(String),
+    /// No route along roads.
+    #[error(transparent)]
+    Roads(#[from] RoadError),
     /// A zone without an outline, or with two.
     #[error("zone {0}: it needs either `polygon` or `circle`")]
     Outline(i64),
@@ -127,11 +150,9 @@ impl RouteFile {
         let goal = place("the goal", self.goal.latitude, self.goal.longitude)?;
         let plane = Plane::new(origin);
         let zones = self.zones.iter().map(|row| row.zone(&plane)).collect::<Result<Vec<_>, _>>()?;
-        let altitude_m = (self.altitude_m, self.altitude_m);
-        let (vehicle, on_water, time_ms) = (self.vehicle, self.on_water, self.time_ms);
-        let conditions = Conditions { vehicle, on_water, altitude_m, time_ms };
+        let conditions = self.conditions();
         let (from, to) = (plane.to_plane(origin), plane.to_plane(goal));
-        let pieces = match (self.turn_radius_m, self.start.heading, self.goal.heading) {
+        let pieces = match (self.turn_radius_m()?, self.start.heading, self.goal.heading) {
             (Some(radius), Some(first), Some(last)) => {
                 let pose = |at: Point, place: Place, heading: f64| Pose {
                     at,
@@ -151,6 +172,13 @@ impl RouteFile {
         };
         let pieces: Vec<Piece> = pieces.map_err(|error| located(error, &plane))?;
         Ok(answer(&plane, origin, &pieces))
+    }
+
+    /// Who is under way, at which height and when.
+    fn conditions(&self) -> Conditions {
+        let altitude_m = (self.altitude_m, self.altitude_m);
+        let (vehicle, on_water, time_ms) = (self.vehicle, self.on_water, self.time_ms);
+        Conditions { vehicle, on_water, altitude_m, time_ms }
     }
 }
 
@@ -225,45 +253,4 @@ fn answer(plane: &Plane, origin: Place, pieces: &[Piece]) -> PlannedRoute {
     };
     let length_m = chords + pieces.iter().map(cut).sum::<f64>();
     PlannedRoute { places, length_m, arcs }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const BOAT: &str = r#"{
-        "start": {"latitude": 60.0, "longitude": 179.97, "heading": 90},
-        "goal": {"latitude": 60.0, "longitude": -179.97, "heading": 90},
-        "turn_radius_m": 50,
-        "zones": [{"id": 7, "kind": "keep_out", "circle": [60.0, 180.0, 500], "padding_m": 50}]
-    }"#;
-
-    #[test]
-    fn a_boat_goes_around_a_zone_on_the_antimeridian() {
-        let file: RouteFile = serde_json::from_str(BOAT).unwrap();
-        let turning = file.plan().unwrap();
-        let straight = RouteFile { turn_radius_m: None, ..file.clone() }.plan().unwrap();
-        assert!(turning.arcs > 0 && straight.arcs == 0 && turning.length_m > straight.length_m);
-        // Around a circle of 550 m half way along 3 346 m: by both tangents and the arc between them.
-        let (half, radius) = (1_673.0_f64, 550.0_f64);
-        let ideal = 2.0 * ((half * half - radius * radius).sqrt() + radius * (radius / half).asin());
-        assert!((straight.length_m / ideal - 1.0).abs() < 0.01, "{} but {ideal}", straight.length_m);
-        let plane = Plane::new(Place { latitude_deg: 60.0, longitude_deg: 180.0 });
-        for place in turning.places.iter().chain(&straight.places) {
-            let point = plane.to_plane(*place);
-            assert!(point.0.hypot(point.1) >= 550.0, "{place:?}");
-        }
-    }
-
-    #[test]
-    fn what_is_wrong_is_told_in_degrees() {
-        let mut file: RouteFile = serde_json::from_str(BOAT).unwrap();
-        file.start.longitude = 180.0;
-        let told = file.plan().unwrap_err().to_string();
-        assert!(told.contains("start lies in keep-out zone 7") && told.contains("latitude"), "{told}");
-        file.zones[0].circle = None;
-        assert_eq!(file.plan(), Err(RouteFileError::Outline(7)));
-        file.goal.latitude = 91.0;
-        assert!(file.plan().unwrap_err().to_string().contains("the goal: latitude 91"));
-    }
 }

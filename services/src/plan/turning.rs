@@ -4,8 +4,9 @@
 //! taken only if its lines and arcs stay in free space. So a way that is given never cuts a zone; where none is found, the
 //! error says so.
 
-mod check;
+pub(in crate::plan) mod check;
 mod dubins;
+mod escape;
 #[cfg(test)]
 mod tests;
 
@@ -85,6 +86,11 @@ impl TurningSpace {
         Ok(Self { space, roomier, radius_m })
     }
 
+    /// The radius of the tightest turn, in metres.
+    pub fn radius_m(&self) -> f64 {
+        self.radius_m
+    }
+
     /// The free space without regard to turns.
     pub fn space(&self) -> &FreeSpace {
         &self.space
@@ -102,8 +108,15 @@ impl TurningSpace {
             return Err(TurningError::Heading(pose.heading_rad));
         }
         let straight = self.space.route(start.at, goal.at)?;
-        let mut best = self.along(start, &straight.points, goal);
-        for space in &self.roomier {
+        let found = self.shortest(start, goal).or_else(|| self.aside(start, goal));
+        let (radius_m, straight_m) = (self.radius_m, straight.length_m);
+        found.ok_or(TurningError::NarrowerThanTurn { radius_m, straight_m })
+    }
+
+    /// The shortest of the ways along straight ones, with more or less room.
+    fn shortest(&self, start: Pose, goal: Pose) -> Option<TurningRoute> {
+        let mut best: Option<TurningRoute> = None;
+        for space in std::iter::once(&self.space).chain(&self.roomier) {
             let points = space.route(start.at, goal.at).map(|route| route.points);
             let found = points.ok().and_then(|points| self.along(start, &points, goal));
             let shorter =
@@ -112,8 +125,7 @@ impl TurningSpace {
                 best = Some(found);
             }
         }
-        let (radius_m, straight_m) = (self.radius_m, straight.length_m);
-        best.ok_or(TurningError::NarrowerThanTurn { radius_m, straight_m })
+        best
     }
 
     /// The shortest way over some of these points' poses, in their order.

@@ -1,15 +1,16 @@
 //! `aldis bench plan`: how good and how fast plans are.
 
+mod roads;
+mod searches;
+mod ways;
+
 use super::super::exit::Failure;
 use super::super::print_line;
-use super::statistics::{median, percentile, rounded};
+use super::statistics::{median, rounded};
 use aldis_services::plan::assignment::instance::{Related, line_searches, random_request};
 use aldis_services::plan::assignment::{
     AssignError, Effort, Objective, Request, assign, evaluate, exhaustive,
 };
-use aldis_services::plan::free_space::instance::{anybody, archipelago, random_map};
-use aldis_services::plan::free_space::{FreeSpace, RouteError};
-use aldis_services::plan::turning::{Piece, Pose, TurningError, TurningSpace};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
@@ -25,22 +26,47 @@ pub(super) struct PlanBench {
     /// Random ways.
     #[arg(long, default_value_t = 10_000)]
     routes: usize,
+    /// Random areas that are searched.
+    #[arg(long, default_value_t = 60)]
+    areas: usize,
+    /// Only these fields.
+    #[arg(long, value_name = "FIELD")]
+    only: Vec<String>,
     /// One JSON object.
     #[arg(long)]
     json: bool,
 }
 
+/// A field, and what measures it.
+type Field<'a> = (&'a str, Box<dyn Fn() -> Result<Value, Failure> + 'a>);
+
 impl PlanBench {
     pub(super) fn run(self) -> Result<(), Failure> {
-        let told = json!({
-            "exhaustive": exhaustively(self.instances)?,
-            "tables_12_tasks_4_vehicles": tables()?,
-            "lines_127_on_2_vehicles": lines(2, 127)?,
-            "lines_64_on_4_vehicles": lines(4, 64)?,
-            "free_space_800": space(100)?,
-            "free_space_3000": space(375)?,
-            "routes": routes(self.routes),
-        });
+        let fields: Vec<Field<'_>> = vec![
+            ("exhaustive", Box::new(|| exhaustively(self.instances))),
+            ("permuted", Box::new(|| permuted(self.instances))),
+            ("tables_12_tasks_4_vehicles", Box::new(tables)),
+            ("lines_127_on_2_vehicles", Box::new(|| lines(2, 127))),
+            ("lines_64_on_4_vehicles", Box::new(|| lines(4, 64))),
+            ("free_space_800", Box::new(|| ways::space(100))),
+            ("free_space_3000", Box::new(|| ways::space(375))),
+            ("optimum", Box::new(|| Ok(ways::optimum(self.routes / 10)))),
+            ("routes", Box::new(|| Ok(ways::routes(self.routes)))),
+            ("areas", Box::new(|| searches::areas(self.areas))),
+            ("patterns", Box::new(searches::patterns)),
+            ("roads", Box::new(roads::roads)),
+        ];
+        if let Some(unknown) = self.only.iter().find(|only| !fields.iter().any(|(name, _)| name == only)) {
+            let names: Vec<_> = fields.iter().map(|(name, _)| *name).collect();
+            return Err(Failure::Usage(format!("no field `{unknown}`: there are {}", names.join(", "))));
+        }
+        let mut told = serde_json::Map::new();
+        for (name, measure) in &fields {
+            if self.only.is_empty() || self.only.iter().any(|only| only == name) {
+                told.insert((*name).to_owned(), measure()?);
+            }
+        }
+        let told = Value::Object(told);
         if self.json {
             print_line(told);
         } else {
@@ -85,6 +111,22 @@ fn exhaustively(instances: u64) -> Result<Value, Failure> {
     }))
 }
 
+/// Random requests, and the same with everything in another order: how many plans differ in a byte.
+fn permuted(instances: u64) -> Result<Value, Failure> {
+    let mut random = fastrand::Rng::with_seed(1);
+    let mut differences = 0;
+    for seed in 0..instances {
+        let related = if seed % 4 == 3 { Related::General } else { Related::Parallel };
+        let request = random_request(seed, 3, 6, 2, related, Objective::MinMax);
+        let mut other = request.clone();
+        random.shuffle(&mut other.vehicles);
+        random.shuffle(&mut other.travel);
+        let plan = |request: &Request| format!("{:?}", assign(request, Effort::default()));
+        differences += u64::from(plan(&request) != plan(&other));
+    }
+    Ok(json!({ "instances": instances, "differences": differences }))
+}
+
 /// One request: the plan's certificate, checked, and how long it took.
 fn timed(request: &Request) -> Result<(Value, f64), Failure> {
     let begin = Instant::now();
@@ -121,85 +163,4 @@ fn lines(vehicles: i64, lines: i64) -> Result<Value, Failure> {
     let all =
         sizes.iter().map(|&(side, length)| Ok(timed(&line_searches(1, vehicles, lines, side, length))?.0));
     Ok(Value::Array(all.collect::<Result<_, Failure>>()?))
-}
-
-/// Free space around so many zones of eight corners: how long it takes to build, and to find ways in.
-fn space(zones: usize) -> Result<Value, Failure> {
-    let mut random = fastrand::Rng::with_seed(zones as u64);
-    let (map, side) = archipelago(&mut random, zones);
-    let mut builds = Vec::new();
-    let mut space = FreeSpace::new(&map, &anybody()).map_err(failed)?;
-    for _ in 0..9 {
-        let begin = Instant::now();
-        space = FreeSpace::new(&map, &anybody()).map_err(failed)?;
-        builds.push(millis(begin.elapsed()));
-    }
-    let (mut times, mut worst) = (Vec::new(), Duration::ZERO);
-    while times.len() < 5_000 {
-        let mut place = || (random.f64() * side, random.f64() * side);
-        let (start, goal) = (place(), place());
-        if space.contains(start) && space.contains(goal) {
-            // The fastest of three: other programs interrupt for longer than a way takes.
-            let once = || {
-                let begin = Instant::now();
-                let found = space.route(start, goal);
-                (begin.elapsed(), found)
-            };
-            let (mut time, found) = once();
-            (0..2).for_each(|_| time = time.min(once().0));
-            if found.is_ok() || found == Err(RouteError::Disconnected) {
-                times.push(time);
-                worst = worst.max(time);
-            }
-        }
-    }
-    Ok(json!({
-        "vertices": space.vertices(), "build_ms": rounded(median(&builds)),
-        "build_least_ms": builds.iter().copied().fold(f64::INFINITY, f64::min), "query_p50_ms": millis(percentile(&mut times, 0.5)),
-        "query_p99_ms": millis(percentile(&mut times, 0.99)), "query_max_ms": millis(worst),
-    }))
-}
-
-/// Random ways on random maps, straight and with turns of 135.6 m: how many leave free space, by exact predicates and by samples.
-fn routes(count: usize) -> Value {
-    let mut random = fastrand::Rng::with_seed(3);
-    let (mut asked, mut straight, mut turning, mut narrow, mut violations) = (0, 0, 0, 0, 0);
-    while asked < count {
-        let map = random_map(&mut random, 14, 10_000.0);
-        let Ok(turns) = TurningSpace::new(&map, &anybody(), 135.6) else { continue };
-        let space = turns.space();
-        // Samples of a line along a zone's border are beside it by rounding: they are held against the zones as they were given,
-        // from which ways stay a hair away.
-        let Ok(given) = FreeSpace::compat(&map) else { continue };
-        for _ in 0..50 {
-            let mut pose = || Pose {
-                at: (random.f64() * 10_000.0, random.f64() * 10_000.0),
-                heading_rad: random.f64() * std::f64::consts::TAU,
-            };
-            let (start, goal) = (pose(), pose());
-            asked += 1;
-            if let Ok(route) = space.route(start.at, goal.at) {
-                straight += 1;
-                violations += route.points.windows(2).filter(|pair| !space.sees(pair[0], pair[1])).count();
-            }
-            match turns.route(start, goal) {
-                Ok(route) => {
-                    turning += 1;
-                    violations += route.pieces.iter().map(|piece| outside(&given, piece)).sum::<usize>();
-                }
-                Err(TurningError::NarrowerThanTurn { .. }) => narrow += 1,
-                Err(_) => {}
-            }
-        }
-    }
-    json!({
-        "asked": asked, "straight": straight, "turning": turning, "narrower_than_turn": narrow, "violations": violations,
-    })
-}
-
-/// How many samples of a piece, one each 2 m, lie outside of free space.
-fn outside(space: &FreeSpace, piece: &Piece) -> usize {
-    let samples = (piece.length_m() / 2.0).ceil().max(1.0);
-    let places = (0..=samples as usize).map(|sample| piece.place(sample as f64 / samples));
-    places.filter(|place| !space.contains(*place)).count()
 }

@@ -33,6 +33,34 @@ pub fn random_map(random: &mut fastrand::Rng, zones: i64, side_m: f64) -> Vec<Zo
     map
 }
 
+/// A region of this side with zones in each other's way: in a ring that keeps a hole, in one with a gap, within each other, and
+/// some of every form.
+pub fn nested_map(random: &mut fastrand::Rng, zones: i64, side_m: f64) -> Vec<Zone> {
+    let mut map = random_map(random, zones, side_m);
+    let mut id = zones;
+    let mut add = |boundary: Boundary, padding_m: f64| {
+        id += 1;
+        map.push(Zone { padding_m, ..Zone::new(id, ZoneKind::KeepOut, boundary) });
+    };
+    for walls in [4, 3] {
+        let center = (random.f64() * side_m, random.f64() * side_m);
+        let (half, turned) = (side_m * (0.08 + 0.08 * random.f64()), random.f64() * TAU);
+        for wall in 0..walls {
+            let rotation_rad = turned + f64::from(wall) * TAU / 4.0;
+            let (sine, cosine) = rotation_rad.sin_cos();
+            let center = (center.0 + sine * half, center.1 - cosine * half);
+            let (width_m, height_m) = (2.2 * half, 0.2 * half);
+            add(Boundary::Rectangle { center, width_m, height_m, rotation_rad }, random.f64() * 30.0);
+        }
+    }
+    let center = (random.f64() * side_m, random.f64() * side_m);
+    let radius_m = side_m * (0.04 + 0.06 * random.f64());
+    add(Boundary::Circle { center, radius_m }, 0.0);
+    add(polygon(center, 6, |_| radius_m * 0.6), 0.0);
+    add(polygon((center.0 + radius_m, center.1), 5, |_| radius_m * 0.7), radius_m * 0.1);
+    map
+}
+
 /// A region with eight-cornered zones in rows, each a little out of place, so that some overlap.
 pub fn archipelago(random: &mut fastrand::Rng, zones: usize) -> (Vec<Zone>, f64) {
     let (row, cell) = ((zones as f64).sqrt().ceil() as usize, 1000.0);

@@ -11,7 +11,7 @@ const WIDER_M: f64 = 1e-6;
 
 /// Whether a piece stays in free space. Of an arc, a triangle around each slice must be free: the chord and the two tangents; so
 /// a narrow escape counts as none, but nothing that is cut counts as free.
-pub(super) fn is_clear(space: &FreeSpace, piece: &Piece) -> bool {
+pub(in crate::plan) fn is_clear(space: &FreeSpace, piece: &Piece) -> bool {
     match *piece {
         Piece::Line { from, to } => space.sees(from, to),
         Piece::Arc { center, radius_m, sweep_rad, .. } => {

@@ -50,6 +50,40 @@ impl Piece {
         }
     }
 
+    /// The place and the heading at a share of it.
+    pub fn pose(&self, share: f64) -> Pose {
+        let heading_rad = match *self {
+            Self::Line { from, to } => (to.1 - from.1).atan2(to.0 - from.0),
+            Self::Arc { from_rad, sweep_rad, .. } => {
+                from_rad + sweep_rad * share + std::f64::consts::FRAC_PI_2.copysign(sweep_rad)
+            }
+        };
+        Pose { at: self.place(share), heading_rad }
+    }
+
+    /// What lies between two shares of it.
+    pub fn part(&self, first: f64, last: f64) -> Self {
+        match *self {
+            Self::Line { .. } => Self::Line { from: self.place(first), to: self.place(last) },
+            Self::Arc { center, radius_m, from_rad, sweep_rad } => Self::Arc {
+                center,
+                radius_m,
+                from_rad: from_rad + sweep_rad * first,
+                sweep_rad: sweep_rad * (last - first),
+            },
+        }
+    }
+
+    /// The same, the other way.
+    pub fn back(&self) -> Self {
+        match *self {
+            Self::Line { from, to } => Self::Line { from: to, to: from },
+            Self::Arc { center, radius_m, from_rad, sweep_rad } => {
+                Self::Arc { center, radius_m, from_rad: from_rad + sweep_rad, sweep_rad: -sweep_rad }
+            }
+        }
+    }
+
     /// How long it is, in metres.
     pub fn length_m(&self) -> f64 {
         match *self {

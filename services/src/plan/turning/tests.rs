@@ -1,7 +1,7 @@
 //! Against zones as they were given, and against what is known of Dubins' words.
 
 use super::*;
-use crate::plan::free_space::instance::{anybody, random_map};
+use crate::plan::free_space::instance::{anybody, nested_map, random_map};
 use crate::plan::free_space::{Boundary, ZoneKind};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -61,7 +61,17 @@ fn depth(zone: &Zone, place: Point) -> f64 {
             }
             zone.padding_m + if inside { near } else { -near }
         }
-        Boundary::Rectangle { .. } => f64::NEG_INFINITY,
+        Boundary::Rectangle { center, width_m, height_m, rotation_rad } => {
+            let (sine, cosine) = rotation_rad.sin_cos();
+            let (x, y) = (place.0 - center.0, place.1 - center.1);
+            let (along, across) = ((x * cosine + y * sine).abs(), (y * cosine - x * sine).abs());
+            let (beyond, beside) = (along - width_m / 2.0, across - height_m / 2.0);
+            if beyond.max(beside) <= 0.0 {
+                zone.padding_m - beyond.max(beside)
+            } else {
+                zone.padding_m - beyond.max(0.0).hypot(beside.max(0.0))
+            }
+        }
     }
 }
 
@@ -69,10 +79,13 @@ fn depth(zone: &Zone, place: Point) -> f64 {
 fn no_way_cuts_a_zone_and_all_turn_wide_enough() {
     let mut random = fastrand::Rng::with_seed(5);
     let (mut found, mut narrow) = (0, 0);
-    for _ in 0..6 {
-        let map = random_map(&mut random, 8, 10_000.0);
+    for number in 0..8 {
+        let map = match number % 2 {
+            0 => random_map(&mut random, 8, 10_000.0),
+            _ => nested_map(&mut random, 5, 10_000.0),
+        };
         let Ok(space) = TurningSpace::new(&map, &anybody(), 135.6) else { continue };
-        for _ in 0..8 {
+        for _ in 0..6 {
             let (start, goal) = (pose(&mut random, 10_000.0), pose(&mut random, 10_000.0));
             let route = match space.route(start, goal) {
                 Ok(route) => route,
