@@ -15,6 +15,7 @@ mod health;
 mod lmcp;
 mod log;
 mod member;
+mod plan;
 mod publish;
 mod record;
 mod replay;
@@ -94,6 +95,8 @@ enum Command {
     Assign(assign::Assign),
     /// Find a way around zones, with turns no tighter than the vehicle makes.
     Route(route::Route),
+    /// Plan what a scenario asks for, offline: assignments, missions, a picture.
+    Plan(plan::Plan),
     /// Measure this machine, side by side with the limit.
     Bench(bench::Bench),
 }
@@ -123,6 +126,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Lmcp(args) => args.run(),
         Command::Assign(args) => args.run(),
         Command::Route(args) => args.run(),
+        Command::Plan(args) => args.run(),
         Command::Bench(args) => args.run(),
     };
     match done {

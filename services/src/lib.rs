@@ -26,6 +26,7 @@ pub mod sim;
 pub mod streams;
 pub mod track;
 pub mod umaa;
+pub mod uxas;
 
 pub use bridge::BridgeSpec;
 pub use event::{BridgeEvent, BridgeId, Effect, Event, PeerEvent, PeerId, PublisherId};

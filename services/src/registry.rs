@@ -5,6 +5,7 @@ use crate::log::Log;
 use crate::service::{Input, Outbox, Service, ServiceSpec};
 use crate::track::{Track, TrackConfig};
 use crate::umaa::allocation::{Arbiter, Arbitration};
+use crate::uxas::Core;
 use aldis_envelope::{EntityId, Guids, Now, ServiceId, Source};
 use std::sync::Arc;
 use std::time::Duration;
@@ -25,6 +26,8 @@ pub enum Kind {
     Arbiter(Arbitration),
     /// A vehicle that moves along a simple track and tells where it is.
     Track(TrackConfig),
+    /// A core service of UxAS.
+    Core(Core),
 }
 
 /// Stands where the host answers for itself: for the node at service 1, and for each bridge.
@@ -73,6 +76,7 @@ pub fn service(source: Source, name: &str, kind: Kind, guids: &Guids) -> Service
             Kind::Log => Box::new(Log::new(source.entity, &guids)),
             Kind::Arbiter(arbitration) => Box::new(Arbiter::new(source, &guids, arbitration.clone())),
             Kind::Track(track) => Box::new(Track::new(source, track.clone())),
+            Kind::Core(core) => core.service(),
         }
     });
     ServiceSpec { source, name: name.to_owned(), factory }

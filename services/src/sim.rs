@@ -15,6 +15,7 @@ pub mod link;
 mod machine;
 mod network;
 mod observe;
+pub mod offline;
 mod options;
 mod run;
 mod trace;

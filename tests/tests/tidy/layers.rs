@@ -18,7 +18,7 @@ const LAYERS: [&[&str]; 8] = [
     &["allow", "calls", "counters", "dds", "event", "journal", "notes", "streams"],
     &["link", "map", "plan", "umaa"],
     &["bridge", "labels"],
-    &["conform", "health", "log", "track"],
+    &["conform", "health", "log", "track", "uxas"],
     &["host", "registry"],
     &["node"],
     &["sim"],
