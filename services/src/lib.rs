@@ -28,6 +28,8 @@ pub mod track;
 pub mod umaa;
 
 pub use bridge::BridgeSpec;
-pub use event::{BridgeEvent, BridgeId, Effect, Event, PeerEvent, PeerId, PublisherId};
+pub use event::{
+    BridgeEvent, BridgeId, Effect, Event, LinkEvent, LinkId, PeerEvent, PeerId, Place, PublisherId,
+};
 pub use node::{Node, NodeConfig};
 pub use service::{Input, Outbox, Service, ServiceSpec};
