@@ -67,7 +67,14 @@ pub struct Offer {
 impl Offer {
     /// A message under no rule.
     pub fn new(ticket: Ticket, envelope: Envelope, class: Class) -> Self {
-        Self { ticket, envelope, class, interval: Duration::ZERO, newest: Newest::Instance, share: (u32::MAX, 100) }
+        Self {
+            ticket,
+            envelope,
+            class,
+            interval: Duration::ZERO,
+            newest: Newest::Instance,
+            share: (u32::MAX, 100),
+        }
     }
 }
 

@@ -272,7 +272,8 @@ impl Outbox {
 
     /// Whether a command may be sent: it is written down.
     pub(super) fn is_safe(&self, number: u64) -> bool {
-        self.flights.contains_key(&number) || self.entries.get(&number).is_some_and(|e| self.is_ready(number, e))
+        self.flights.contains_key(&number)
+            || self.entries.get(&number).is_some_and(|e| self.is_ready(number, e))
     }
 
     fn is_ready(&self, number: u64, entry: &Entry) -> bool {

@@ -45,7 +45,9 @@ impl Link {
                 self.counters.bytes_sent += frame.len() as u64;
                 effects.push(Effect::Transmit(path.config.id, frame));
                 let gone_out = self.gone_out.drain(..);
-                effects.extend(gone_out.map(|(ticket, tries)| Effect::Ticket(ticket, TicketState::OnAir { tries })));
+                effects.extend(
+                    gone_out.map(|(ticket, tries)| Effect::Ticket(ticket, TicketState::OnAir { tries })),
+                );
             }
         }
     }

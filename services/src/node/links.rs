@@ -10,19 +10,27 @@ mod tickets;
 
 use super::{Node, Origin};
 use crate::event::{Effect, LinkEvent, LinkId, Place};
-use crate::link::{self, BatchId, CarrierId, Link, LinkSpec, Offer, Record, Ticket, TicketState, record_prefix};
+use crate::link::{
+    self, BatchId, CarrierId, Link, LinkSpec, Offer, Record, Ticket, TicketState, record_prefix,
+};
 use crate::service::Level;
 use aldis_envelope::aldis::link as told;
 use aldis_envelope::umaa::{CommandKey, Key};
 use aldis_envelope::{
-    Address, CallId, EntityId, Envelope, Fleet, GuidForm, Guids, Label, Message, Monotonic, Now, Prefix, Source,
+    Address, CallId, EntityId, Envelope, Fleet, GuidForm, Guids, Label, Message, Monotonic, Now, Prefix,
+    Source,
 };
 use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
 
 /// How many calls are followed by their tickets. The callers of others hear nothing until the answer.
 const CALLERS_MAX: usize = 4_096;
 /// What waits while the journal is read back. Beyond it, what comes is refused by the link itself.
 const EARLY_MAX: usize = 65_536;
+
+/// How long the tokens of the services behind a link stay after its peer was last known to be heard. On a bad link some silence is
+/// chance, and calls that are under way end when a token goes.
+const TOKENS_STAY: Duration = Duration::from_secs(20);
 
 /// What the links of one turn ask to be written: which link, its batch, its records.
 type Writes = Vec<(usize, BatchId, Vec<Record>)>;
@@ -38,6 +46,8 @@ struct Attached {
     ready: bool,
     armed: Option<Monotonic>,
     heard: bool,
+    /// When the tokens of those behind it go.
+    hide_at: Option<Monotonic>,
     /// Where the peer was last, by each carrier.
     places: BTreeMap<CarrierId, Place>,
     /// The services behind it, as the peer tells.
@@ -90,6 +100,7 @@ impl Links {
             ready: false,
             armed: None,
             heard: false,
+            hide_at: None,
             places: BTreeMap::new(),
             services: BTreeSet::new(),
             next_ticket: 1,
@@ -140,7 +151,7 @@ impl Links {
     }
 
     pub(super) fn next_deadline(&self) -> Option<Monotonic> {
-        self.all.iter().filter_map(|attached| attached.armed).min()
+        self.all.iter().flat_map(|attached| [attached.armed, attached.hide_at]).flatten().min()
     }
 
     pub(super) fn services_changed(&mut self) {
@@ -244,8 +255,12 @@ impl Node {
         }
     }
 
-    pub(super) fn links_due(&mut self, now: Now) {
+    pub(super) fn links_due(&mut self, now: Now, effects: &mut Vec<Effect>) {
         for place in 0..self.links.all.len() {
+            if self.links.all[place].hide_at.is_some_and(|at| at <= now.monotonic) {
+                self.links.all[place].hide_at = None;
+                self.show_services(place, effects);
+            }
             if self.links.all[place].armed.is_some_and(|at| at <= now.monotonic) {
                 self.links.all[place].armed = None;
                 self.links.give(place, link::Event::Deadline);
@@ -358,10 +373,15 @@ impl Node {
         let attached = &mut self.links.all[place];
         attached.heard = heard;
         let (name, peer) = (attached.spec.name.clone(), attached.spec.link.peer);
-        let text = if heard { format!("{name}: {peer} is heard") } else { format!("{name}: {peer} is silent") };
+        let text =
+            if heard { format!("{name}: {peer} is heard") } else { format!("{name}: {peer} is silent") };
         let level = if heard { Level::Information } else { Level::Warning };
         self.say(now, level, &text.clone(), text, effects);
-        self.show_services(place, effects);
+        let attached = &mut self.links.all[place];
+        attached.hide_at = (!heard).then_some(now.monotonic + TOKENS_STAY);
+        if heard {
+            self.show_services(place, effects);
+        }
     }
 }
 

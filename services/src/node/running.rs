@@ -193,7 +193,7 @@ impl Node {
             }
         }
         self.sharing_due(now, effects);
-        self.links_due(now);
+        self.links_due(now, effects);
         self.give_up_stalled_peers(now, effects);
     }
 

@@ -119,8 +119,9 @@ impl Node {
             return;
         }
         let (services, links) = (&self.services, &self.links);
-        let is_read =
-            |address: &Address| services.iter().any(|hosted| hosted.receives(address)) || links.reads(address);
+        let is_read = |address: &Address| {
+            services.iter().any(|hosted| hosted.receives(address)) || links.reads(address)
+        };
         self.sharing.reading.retain(is_read);
         self.sharing.prefixes = prefixes;
         self.sharing.number += 1;

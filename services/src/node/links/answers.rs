@@ -11,7 +11,11 @@ const LISTED_MAX: usize = 1_000;
 
 impl Node {
     /// The answer to a request about links: its descriptor and content. None where it is no such request, or cannot be read.
-    pub(in crate::node) fn answer_about_links(&mut self, now: Now, request: &Envelope) -> Option<(&'static str, Bytes)> {
+    pub(in crate::node) fn answer_about_links(
+        &mut self,
+        now: Now,
+        request: &Envelope,
+    ) -> Option<(&'static str, Bytes)> {
         let content = &request.message.content;
         match request.message.label.descriptor() {
             told::LINK_QUERY => Some((told::LINK_STATUS, self.link_statuses(now))),
@@ -43,7 +47,8 @@ impl Node {
 
     fn queued(&self, now: Now, asked: &told::QueueQuery) -> Vec<told::QueuedCommand> {
         let limit = (asked.limit as usize).min(LISTED_MAX);
-        let links = self.links.all.iter().filter(|link| asked.peer.is_none_or(|peer| peer == link.spec.link.peer));
+        let links =
+            self.links.all.iter().filter(|link| asked.peer.is_none_or(|peer| peer == link.spec.link.peer));
         links.flat_map(|link| link.link.queued(now.monotonic, asked.number, limit)).take(limit).collect()
     }
 

@@ -7,9 +7,7 @@ use crate::link::export::Newest;
 use crate::link::{self, Class, Offer, Ticket};
 use crate::service::Input;
 use aldis_envelope::aldis::{self, link as told};
-use aldis_envelope::{
-    ContentType, Envelope, Label, Message, Name, Now, Priority, ServiceId, Source, Stamp,
-};
+use aldis_envelope::{ContentType, Envelope, Label, Message, Name, Now, Priority, ServiceId, Source, Stamp};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
@@ -60,7 +58,13 @@ impl Node {
     }
 
     /// The peer tells which services are alive behind it.
-    pub(super) fn services_told(&mut self, now: Now, place: usize, envelope: &Envelope, effects: &mut Vec<Effect>) {
+    pub(super) fn services_told(
+        &mut self,
+        now: Now,
+        place: usize,
+        envelope: &Envelope,
+        effects: &mut Vec<Effect>,
+    ) {
         let attached = &mut self.links.all[place];
         let Some(told) = aldis::decode::<Vec<Source>>(&envelope.message.content) else { return };
         let behind = &attached.spec.export.behind;

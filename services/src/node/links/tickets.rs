@@ -95,7 +95,9 @@ impl Node {
             let call = Some(Box::new(Call { id: caller.call, role: Role::Refused { reason } }));
             say(Message { call, ..Message::new(Arc::new(label), bytes::Bytes::new()) });
         }
-        if caller.wants_word && let Ok(name) = Name::new(told::TICKET) {
+        if caller.wants_word
+            && let Ok(name) = Name::new(told::TICKET)
+        {
             let label = Label::limitedcast(to, ContentType::Aldis, name.into(), own);
             let peer = self.links.all[place].spec.link.peer;
             let word = told::CallTicket { call: caller.call, peer, state: call_state(state) };
@@ -108,10 +110,13 @@ impl Node {
     fn tell_people(&mut self, now: Now, place: usize, state: &TicketState, effects: &mut Vec<Effect>) {
         let name = &self.links.all[place].spec.name;
         let (kind, text) = match state {
-            TicketState::Refused(reason) => ("refused", format!("{name}: a message is not carried: {reason}")),
-            TicketState::Expired { tries } => {
-                ("expired", format!("{name}: a command's lifespan ended before it arrived, sent {tries} times"))
+            TicketState::Refused(reason) => {
+                ("refused", format!("{name}: a message is not carried: {reason}"))
             }
+            TicketState::Expired { tries } => (
+                "expired",
+                format!("{name}: a command's lifespan ended before it arrived, sent {tries} times"),
+            ),
             _ => return,
         };
         self.say(now, Level::Warning, &format!("{name} {kind}"), text, effects);

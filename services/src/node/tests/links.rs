@@ -28,7 +28,10 @@ fn rules() -> Vec<Rule> {
         ..Rule::new("", Class::Command)
     };
     vec![
-        Rule { lifespan: Some(Duration::from_secs(600)), ..Rule::new("UMAA::SO::X::XCommand", Class::Command) },
+        Rule {
+            lifespan: Some(Duration::from_secs(600)),
+            ..Rule::new("UMAA::SO::X::XCommand", Class::Command)
+        },
         Rule::new("UMAA::SO::T::", Class::State),
         addressed("eid1"),
         addressed("eid9000"),
@@ -66,7 +69,9 @@ fn sender(of: Source) -> (ServiceSpec, Seen) {
         let Input::Message(envelope) = input else { return };
         let Ok(text) = std::str::from_utf8(&envelope.message.content) else { return };
         let mut words = text.split(' ');
-        let (Some(to), Some(number), Some(change)) = (words.next(), words.next(), words.next()) else { return };
+        let (Some(to), Some(number), Some(change)) = (words.next(), words.next(), words.next()) else {
+            return;
+        };
         let number: i64 = number.parse().unwrap();
         let (topic, instance) = match to {
             "-" => ("UMAA::SO::T::TReport", Instance::of_number(number)),

@@ -22,7 +22,13 @@ pub(super) struct Links {
 
 impl World {
     /// Joins a link of one node to a link of another by a carrier.
-    pub fn join(&mut self, a: (NodeHandle, LinkId), b: (NodeHandle, LinkId), carrier: CarrierId, profile: &Profile) {
+    pub fn join(
+        &mut self,
+        a: (NodeHandle, LinkId),
+        b: (NodeHandle, LinkId),
+        carrier: CarrierId,
+        profile: &Profile,
+    ) {
         for (from, to) in [(a, b), (b, a)] {
             let way = Way::new(profile.clone(), self.random.u64(..));
             self.links.ways.insert((from.0.0, from.1, carrier), (to.0.0, to.1, way));
@@ -55,7 +61,9 @@ impl World {
             self.handle(place, events);
         }
         let ends = self.links.ways.iter().filter(|((from, ..), _)| *from == place);
-        let events = ends.map(|((_, link, carrier), (.., way))| Event::Link(*link, LinkEvent::Up(*carrier, way.profile().mtu)));
+        let events = ends.map(|((_, link, carrier), (.., way))| {
+            Event::Link(*link, LinkEvent::Up(*carrier, way.profile().mtu))
+        });
         let events = events.collect();
         self.handle(place, events);
     }
