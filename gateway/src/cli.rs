@@ -12,15 +12,18 @@ mod demo;
 mod exit;
 mod fleet;
 mod health;
+mod link;
 mod lmcp;
 mod log;
 mod member;
 mod publish;
+mod queue;
 mod record;
 mod replay;
 mod retained;
 mod route;
 mod run;
+mod sim;
 mod subscribe;
 mod telemetry;
 mod within;
@@ -94,6 +97,12 @@ enum Command {
     Assign(assign::Assign),
     /// Find a way around zones, with turns no tighter than the vehicle makes.
     Route(route::Route),
+    /// Links of nodes, and bad links to try them on.
+    Link(link::LinkArgs),
+    /// Commands that wait to cross a link.
+    Queue(queue::QueueArgs),
+    /// Simulate in virtual time.
+    Sim(sim::Sim),
     /// Measure this machine, side by side with the limit.
     Bench(bench::Bench),
 }
@@ -123,6 +132,9 @@ pub(crate) fn main() -> ExitCode {
         Command::Lmcp(args) => args.run(),
         Command::Assign(args) => args.run(),
         Command::Route(args) => args.run(),
+        Command::Link(args) => args.run(),
+        Command::Queue(args) => args.run(),
+        Command::Sim(args) => args.run(),
         Command::Bench(args) => args.run(),
     };
     match done {
