@@ -39,17 +39,27 @@ pub(crate) struct Relay {
     start: Instant,
     due: BTreeMap<(Monotonic, u64), (SocketAddr, Vec<u8>)>,
     number: u64,
+    /// Nothing passes, whatever the profile says.
+    cut: Arc<AtomicBool>,
     passed: Arc<Passed>,
 }
 
 /// A relay on a thread of its own; it ends when this is dropped.
 pub(crate) struct Running {
     stop: Arc<AtomicBool>,
+    cut: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
     /// Where it listens.
     pub(crate) address: SocketAddr,
     /// What passed.
     pub(crate) passed: Arc<Passed>,
+}
+
+impl Running {
+    /// Cuts the link both ways, or mends it.
+    pub(crate) fn cut(&self, cut: bool) {
+        self.cut.store(cut, Ordering::Relaxed);
+    }
 }
 
 impl Drop for Running {
@@ -86,6 +96,7 @@ impl Relay {
             start: Instant::now(),
             due: BTreeMap::new(),
             number: 0,
+            cut: Arc::default(),
             passed: Arc::default(),
         })
     }
@@ -105,7 +116,7 @@ impl Relay {
     /// What the system says of the socket or the thread.
     pub(crate) fn spawn(mut self) -> io::Result<Running> {
         let (address, passed) = (self.address()?, self.passed());
-        let stop = Arc::new(AtomicBool::new(false));
+        let (stop, cut) = (Arc::new(AtomicBool::new(false)), self.cut.clone());
         let asked = stop.clone();
         let run = move || {
             if let Err(why) = self.run(|| asked.load(Ordering::Relaxed)) {
@@ -113,7 +124,7 @@ impl Relay {
             }
         };
         let thread = Some(std::thread::Builder::new().name("relay".into()).spawn(run)?);
-        Ok(Running { stop, thread, address, passed })
+        Ok(Running { stop, cut, thread, address, passed })
     }
 
     /// Relays until it is to stop.
@@ -157,11 +168,12 @@ impl Relay {
         }
         let now = self.now();
         let arrivals = self.ways[end].send(now, bytes.len());
+        let is_cut = self.cut.load(Ordering::Relaxed);
         self.passed.came[end].fetch_add(1, Ordering::Relaxed);
         self.passed.bytes[end].fetch_add(bytes.len() as u64, Ordering::Relaxed);
         self.passed.lost[end].store(self.ways[end].lost, Ordering::Relaxed);
         let Some(to) = (if end == 0 { self.second } else { Some(self.first) }) else { return };
-        for at in arrivals {
+        for at in arrivals.into_iter().filter(|_| !is_cut) {
             self.number += 1;
             self.due.insert((at, self.number), (to, bytes.to_vec()));
         }
