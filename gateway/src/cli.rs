@@ -12,16 +12,19 @@ mod demo;
 mod exit;
 mod fleet;
 mod health;
+mod link;
 mod lmcp;
 mod log;
 mod member;
 mod plan;
 mod publish;
+mod queue;
 mod record;
 mod replay;
 mod retained;
 mod route;
 mod run;
+mod sim;
 mod subscribe;
 mod telemetry;
 mod within;
@@ -97,6 +100,12 @@ enum Command {
     Route(route::Route),
     /// Plan what a scenario asks for, offline: assignments, missions, a picture.
     Plan(plan::Plan),
+    /// Links of nodes, and bad links to try them on.
+    Link(link::LinkArgs),
+    /// Commands that wait to cross a link.
+    Queue(queue::QueueArgs),
+    /// Simulate in virtual time.
+    Sim(sim::Sim),
     /// Measure this machine, side by side with the limit.
     Bench(bench::Bench),
 }
@@ -127,6 +136,9 @@ pub(crate) fn main() -> ExitCode {
         Command::Assign(args) => args.run(),
         Command::Route(args) => args.run(),
         Command::Plan(args) => args.run(),
+        Command::Link(args) => args.run(),
+        Command::Queue(args) => args.run(),
+        Command::Sim(args) => args.run(),
         Command::Bench(args) => args.run(),
     };
     match done {

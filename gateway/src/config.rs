@@ -12,6 +12,7 @@ mod check;
 mod cure;
 mod entities;
 mod error;
+mod link;
 mod locator;
 mod read;
 mod resource;
@@ -26,6 +27,7 @@ pub(crate) use bridge::{Bridge, Endpoint};
 pub(crate) use bus::Bus;
 pub(crate) use entities::{Entities, Operators};
 pub(crate) use error::ConfigError;
+pub(crate) use link::{CarrierKind, KeyError, KeyFile, Link};
 pub(crate) use locator::Locator;
 pub(crate) use resource::{Allocation, Party, Resource};
 pub(crate) use schema::schema;
@@ -69,6 +71,9 @@ pub(crate) struct Config {
     /// Where other worlds are joined.
     #[serde(default, rename = "bridge")]
     pub(crate) bridges: Vec<Bridge>,
+    /// Lossy hops to other entities, and what crosses them.
+    #[serde(default, rename = "link")]
+    pub(crate) links: Vec<Link>,
     /// Who may call what, beyond the defaults.
     #[serde(default)]
     pub(crate) allow: Vec<Allow>,
@@ -101,7 +106,9 @@ impl Config {
         let file = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|e| ConfigError::unreadable(&file, &e))?;
         let mut config = Self::parse(&file, &text)?;
-        config.bus.resolve(path.parent().unwrap_or(Path::new("")));
+        let directory = path.parent().unwrap_or(Path::new(""));
+        config.bus.resolve(directory);
+        config.links.iter_mut().for_each(|link| link.resolve(directory));
         Ok(config)
     }
 

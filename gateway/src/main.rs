@@ -4,6 +4,7 @@
 
 mod bridge;
 mod bus;
+mod carrier;
 mod cli;
 mod clock;
 mod config;

@@ -9,6 +9,7 @@ pub(crate) use core::{Core, Shared};
 pub(crate) use wiring::{Outside, node_config, outside};
 
 use crate::bridge::uxas_tcp;
+use crate::carrier::{serial, udp};
 use aldis_services::event::BridgeId;
 use aldis_services::{Event, Node, NodeConfig};
 use std::sync::Arc;
@@ -41,18 +42,22 @@ pub(crate) enum RuntimeError {
 
 /// Runs a node until it ends. Blocks this thread; nothing of it outlives the call.
 pub(crate) fn run(
-    config: NodeConfig,
+    mut config: NodeConfig,
     outside: Outside,
     control: mpsc::UnboundedReceiver<Control>,
 ) -> Result<(), RuntimeError> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let keys = aldis_envelope::Keys::new(&config.fleet);
     let dialects = config.bridges.iter().map(|bridge| bridge.dialect).collect();
+    for (link, keys) in config.links.iter_mut().zip(&outside.link_keys) {
+        link.link.keys.clone_from(keys);
+    }
+    let links = config.links.len();
     let node = Node::new(config).map_err(RuntimeError::Config)?;
     let local = LocalSet::new();
     local.block_on(&runtime, async move {
         let (core, ends) = Core::build(node, dialects, tokio::runtime::Handle::current());
-        drive(core, ends, outside, keys, control).await;
+        drive(core, ends, outside.for_links(links), keys, control).await;
     });
     runtime.shutdown_timeout(Duration::from_secs(1));
     Ok(())
@@ -86,6 +91,13 @@ async fn drive(
     tasks.spawn_local(bus_task::drain(core.clone(), inbox.clone(), paused.clone()));
     for (i, endpoint) in outside.bridges.into_iter().enumerate() {
         tasks.spawn_local(uxas_tcp::serve(core.clone(), BridgeId(i), endpoint, paused.clone()));
+    }
+    for port in outside.udp {
+        tasks.spawn_local(udp::serve(core.clone(), port));
+    }
+    for line in outside.lines {
+        let core = core.clone();
+        tasks.spawn_blocking(move || serial::serve(&core, &line));
     }
     let (closed, mut is_closed) = watch::channel(false);
     let bus = bus_task::keep(core.clone(), inbox, keys, outside.bus, silenced, closed);

@@ -44,6 +44,10 @@ counters! {
     shed_from_bus,
     /// Messages that had passed this node before.
     loops_stopped,
+    /// Messages that came by a link from entities behind it.
+    imported_by_links,
+    /// Messages refused at a link because their source is not behind it.
+    refused_links,
     /// Requests refused by `[allow]`.
     calls_forbidden,
     /// Calls of own services that were answered.

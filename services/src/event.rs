@@ -1,5 +1,6 @@
 //! All that a node can be told, and all that it can ask for. A shell knows nothing else of it.
 
+use crate::link::{CarrierId, Record};
 use crate::service::{ComponentHealth, Job, JobOutput, Note};
 use aldis_envelope::codec::native::HeaderError;
 use aldis_envelope::codec::stream::StreamError;
@@ -18,6 +19,14 @@ pub struct PeerId(pub u64);
 /// A key that the node puts envelopes on, numbered by the node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PublisherId(pub usize);
+
+/// A link of a node, by its place in the configuration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct LinkId(pub usize);
+
+/// A place that frames come from, numbered by the shell: an address of the network. What it is, the shell alone knows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Place(pub u64);
 
 /// Something that happened.
 pub enum Event {
@@ -39,6 +48,16 @@ pub enum Event {
     Bridge(BridgeId, BridgeEvent),
     /// Something at a peer of a bridge.
     Peer(BridgeId, PeerId, PeerEvent),
+    /// Something at a link.
+    Link(LinkId, LinkEvent),
+    /// A record of the links that stood in the journal at the start. Before [`Event::ReadBackEnd`] alone.
+    ReadBack(Record),
+    /// The journal has told all that it held.
+    ReadBackEnd,
+    /// The records of [`Effect::Persist`] with this number are safe.
+    Persisted(u64),
+    /// They were not written, and why.
+    PersistFailed(u64, String),
     /// A job is done, or panicked with this text.
     Job(Source, u64, Result<JobOutput, String>),
     /// The health of something that the shell looks after changed.
@@ -73,6 +92,19 @@ pub enum PeerEvent {
     Bad(StreamError),
 }
 
+/// Something at a link.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum LinkEvent {
+    /// A frame came by a carrier, from a place.
+    Frame(CarrierId, Place, Bytes),
+    /// A carrier can be used, with frames of at most so many bytes.
+    Up(CarrierId, usize),
+    /// A carrier cannot be used, and why.
+    Down(CarrierId, String),
+    /// Radio silence begins (true) or ends.
+    Silent(bool),
+}
+
 /// Something to do.
 pub enum Effect {
     /// Have these key expressions subscribed to, and no others.
@@ -96,6 +128,13 @@ pub enum Effect {
     Token(Source, bool),
     /// Write a message to a peer.
     Send(BridgeId, PeerId, Arc<Label>, Bytes),
+    /// Send a frame of a link by a carrier, to where its peer is. A carrier that cannot take it now drops it.
+    Transmit(LinkId, CarrierId, Vec<u8>),
+    /// The peer of a link is at this place: what came from there was authentic.
+    Found(LinkId, CarrierId, Place),
+    /// Write these records as one, then tell with [`Event::Persisted`] and this number. Batches are written in their order. Comes
+    /// only where the configuration says that there is a journal.
+    Persist(u64, Vec<Record>),
     /// Stop (true) or go on reading from peers and bus.
     PauseInput(bool),
     /// Compute something outside the loop and tell with [`Event::Job`].

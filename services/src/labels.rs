@@ -3,7 +3,7 @@
 //! Labels are shared by the messages of a stream, so that a pointer finds the entry: the hottest look-up of the node.
 
 use crate::dds::Qos;
-use crate::event::{BridgeId, PublisherId};
+use crate::event::{BridgeId, LinkId, PublisherId};
 use aldis_envelope::{EntityId, KeyHash, Label};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -20,6 +20,8 @@ pub(crate) struct Entry {
     pub(crate) services: Vec<usize>,
     /// The bridges that export it.
     pub(crate) bridges: Vec<BridgeId>,
+    /// The links whose rules name it, with the number of the rule.
+    pub(crate) links: Vec<(LinkId, usize)>,
     /// Whether it goes out on the bus when it starts here.
     pub(crate) publish: bool,
     /// Whether it is taken when it comes from the bus.

@@ -29,6 +29,8 @@ pub mod umaa;
 pub mod uxas;
 
 pub use bridge::BridgeSpec;
-pub use event::{BridgeEvent, BridgeId, Effect, Event, PeerEvent, PeerId, PublisherId};
+pub use event::{
+    BridgeEvent, BridgeId, Effect, Event, LinkEvent, LinkId, PeerEvent, PeerId, Place, PublisherId,
+};
 pub use node::{Node, NodeConfig};
 pub use service::{Input, Outbox, Service, ServiceSpec};

@@ -26,11 +26,13 @@ mod send;
 mod sent;
 mod session;
 mod state;
+mod status;
 mod wire;
 
 pub use event::{
     BatchId, Class, Delivery, DeliveryId, Effect, Event, Offer, Reason, Record, Ticket, TicketState,
 };
+pub use export::LinkSpec;
 pub use frame::VERSION;
 pub use path::{CarrierConfig, CarrierId, GONE_AFTER, MTU_MIN};
 pub use record::record_prefix;
@@ -180,6 +182,8 @@ pub struct Link {
     batches: BTreeMap<BatchId, Vec<AfterWrite>>,
     next_batch: u64,
     reserved: u64,
+    /// Commands of which a whole copy has just gone out, with how many there were.
+    gone_out: Vec<(Ticket, u32)>,
     armed: Option<Monotonic>,
     counters: LinkCounters,
 }
@@ -230,6 +234,7 @@ impl Link {
             batches: BTreeMap::new(),
             next_batch: 0,
             reserved: 1,
+            gone_out: Vec::new(),
             armed: None,
             counters: LinkCounters::default(),
         }

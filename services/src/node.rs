@@ -3,6 +3,7 @@
 mod administration;
 mod bridges;
 mod deliver;
+mod links;
 mod running;
 mod sharing;
 
@@ -11,17 +12,19 @@ use crate::bridge::{Bridge, BridgeSpec};
 use crate::calls::{Alive, Calls};
 use crate::counters::Counters;
 use crate::dds::{TopicRule, Topics};
-use crate::event::{BridgeId, Effect, Event, PeerId, PublisherId};
+use crate::event::{BridgeId, Effect, Event, LinkId, PeerId, PublisherId};
 use crate::host::Hosted;
 use crate::labels::Labels;
+use crate::link::LinkSpec;
 use crate::notes::Notes;
 use crate::registry;
 use crate::service::{Action, Component, ComponentHealth, Condition, Input, Level, ServiceSpec};
 use crate::streams::{Inbound, Outbound};
 use aldis_envelope::{
     Address, BootId, EntityId, Fleet, KeyHash, Keys, Label, Message, Monotonic, Now, Prefix, Priority,
-    ServiceId, Space,
+    ServiceId, Space, Wall,
 };
+use links::Links;
 use sharing::Sharing;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -52,6 +55,10 @@ pub struct NodeConfig {
     pub services: Vec<ServiceSpec>,
     /// The bridges.
     pub bridges: Vec<BridgeSpec>,
+    /// The links across which other entities are reached.
+    pub links: Vec<LinkSpec>,
+    /// Whether the shell keeps a journal: it tells what stood in it, then carries out [`Effect::Persist`].
+    pub journaled: bool,
 }
 
 /// Where a message came from.
@@ -59,7 +66,17 @@ pub struct NodeConfig {
 enum Origin {
     Service(usize),
     Peer(BridgeId, PeerId),
+    Link(LinkId),
     Bus,
+}
+
+/// What the stamp keeps of a message that came by a link.
+#[derive(Debug, Clone)]
+struct Passed {
+    source_time: Wall,
+    lifespan_left_ms: Option<u32>,
+    priority: Priority,
+    via: Vec<EntityId>,
 }
 
 /// A message that waits inside the node.
@@ -68,11 +85,13 @@ struct Work {
     message: Message,
     /// The number and the bound where its sender wants to know that all readers have it.
     confirm: Option<(u64, Duration)>,
+    /// Where it came by a link.
+    passed: Option<Box<Passed>>,
 }
 
 impl Work {
     fn new(origin: Origin, message: Message) -> Self {
-        Self { origin, message, confirm: None }
+        Self { origin, message, confirm: None, passed: None }
     }
 }
 
@@ -96,6 +115,7 @@ pub struct Node {
     notes: Notes,
     work: VecDeque<Work>,
     sharing: Sharing,
+    links: Links,
     /// Requests that wait until the tokens are told: before that, nobody knows where they can go.
     waiting_calls: Vec<(usize, Message)>,
     /// Services with wishes in their outboxes.
@@ -137,6 +157,7 @@ impl Node {
             services: config.services.iter().cloned().chain(stand_ins).map(Hosted::new).collect(),
             bridges: config.bridges.iter().map(|spec| Bridge::new(spec.clone(), &config.entities)).collect(),
             sharing: Sharing::new(Topics::new(config.topics.clone())),
+            links: Links::new(&config.links, config.journaled, config.boot, &config.fleet),
             config,
             labels: Labels::default(),
             outbound: Outbound::default(),
@@ -180,7 +201,9 @@ impl Node {
             self.event(now, event, effects);
             self.settle(now, effects);
         }
+        self.run_links(now, effects);
         self.finish_sharing(now, effects);
+        self.run_links(now, effects);
         self.update_pause(effects);
         self.arm(effects);
     }
@@ -192,12 +215,14 @@ impl Node {
             Event::Deadline => self.deadline(now, effects),
             Event::Alive(source, alive) => {
                 self.alive.set(source, alive);
+                self.links.services_changed();
                 self.tokens_changed(now, effects);
                 self.token(now, source, alive, effects);
                 self.tell_followers(now, || Input::Token(source, alive), effects);
             }
             Event::AliveKnown => {
                 self.alive.set_known(true);
+                self.show_all_services(effects);
                 self.tokens_changed(now, effects);
                 self.send_waiting_calls();
                 self.joined(now, effects);
@@ -215,6 +240,11 @@ impl Node {
                 self.say(now, Level::Warning, "shed from bus", text, effects);
             }
             Event::Bridge(bridge, event) => self.bridge(now, bridge, event, effects),
+            Event::Link(id, event) => self.link_event(now, id, event, effects),
+            Event::ReadBack(record) => self.link_read_back(record),
+            Event::ReadBackEnd => self.link_read_back_end(),
+            Event::Persisted(number) => self.link_written(number, None),
+            Event::PersistFailed(number, why) => self.link_written(number, Some(&why)),
             Event::Job(source, number, result) => self.job_done(now, source, number, result, effects),
             Event::Component(health) => self.component(now, &health),
             Event::Shutdown => self.shutdown(now, effects),
@@ -222,6 +252,7 @@ impl Node {
     }
 
     fn start(&mut self, now: Now, effects: &mut Vec<Effect>) {
+        self.start_links(now, effects);
         for place in 0..self.services.len() {
             self.start_service(now, place, effects);
         }
@@ -269,6 +300,7 @@ impl Node {
             self.config.entities.iter().map(|&entity| Prefix::Id(Address::Entity(entity))).collect();
         prefixes.extend(self.services.iter().flat_map(Hosted::prefixes));
         prefixes.extend(self.bridges.iter().flat_map(|bridge| bridge.spec.export.iter().cloned()));
+        prefixes.extend(self.links.prefixes());
         let mut expressions = self.keys.cover(Space::Data, &prefixes);
         expressions.extend(self.keys.cover(Space::Writer, &prefixes));
         let (to_node, to_nodes) = sharing::subscriptions(self.entity());
@@ -305,7 +337,8 @@ impl Node {
         let services = self.services.iter().filter_map(Hosted::next_deadline);
         let bridges = self.bridges.iter().filter_map(Bridge::next_deadline);
         let shared = self.sharing.next_deadline();
-        let next = services.chain(bridges).chain(self.calls.next_deadline()).chain(shared).min();
+        let others = [self.calls.next_deadline(), shared, self.links.next_deadline()];
+        let next = services.chain(bridges).chain(others.into_iter().flatten()).min();
         if let Some(at) = next
             && self.armed != next
             && !self.ending

@@ -3,7 +3,7 @@
 use crate::service::{Input, Level, Outbox, Service};
 use aldis_envelope::lmcp::vehicles::SurfaceVehicleState;
 use aldis_envelope::lmcp::{self, Ref, cmasi};
-use aldis_envelope::{ContentType, EntityId, Instance, Label, Message, Monotonic, Name, Now, Source};
+use aldis_envelope::{ContentType, EntityId, Instance, Label, Message, Monotonic, Name, Now, Source, Wall};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -99,6 +99,12 @@ impl Track {
     }
 }
 
+/// How many bytes a state of such a track has.
+pub fn state_bytes(source: Source, config: &TrackConfig) -> usize {
+    let now = Now { monotonic: Monotonic::START, wall: Wall(0) };
+    lmcp::encode(&Track::new(source, config.clone()).state(now)).map_or(0, |content| content.len())
+}
+
 impl Service for Track {
     fn handle(&mut self, now: Now, input: Input<'_>, out: &mut Outbox) {
         match input {
@@ -120,7 +126,7 @@ impl Service for Track {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use aldis_envelope::{ServiceId, Wall};
+    use aldis_envelope::ServiceId;
 
     #[test]
     fn a_vehicle_that_turns_all_the_way_comes_back() {

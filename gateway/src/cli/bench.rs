@@ -4,6 +4,7 @@ mod bus;
 mod child;
 mod join;
 mod journal;
+mod link;
 mod lmcp;
 mod plan;
 mod service_node;
@@ -17,7 +18,7 @@ use clap::Subcommand;
 /// Measure this machine: each figure beside a peer's or the limit's, turn about in the same run.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json\n  aldis bench lmcp --json\n  aldis bench join --instances 10000 --rate 1000 --json\n  aldis bench umaa --json\n  aldis bench journal --json\n  aldis bench plan --json"
+    after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json\n  aldis bench lmcp --json\n  aldis bench join --instances 10000 --rate 1000 --json\n  aldis bench umaa --json\n  aldis bench journal --json\n  aldis bench plan --json\n  aldis bench link --profile L1 --json"
 )]
 pub(crate) struct Bench {
     #[command(subcommand)]
@@ -43,6 +44,8 @@ enum What {
     Journal(journal::JournalBench),
     /// How good and how fast plans are.
     Plan(plan::PlanBench),
+    /// The lossy link against its table of goals, in virtual time.
+    Link(link::LinkBench),
     /// The other process of `bench bus`.
     #[command(hide = true)]
     BusPeer(bus::BusPeer),
@@ -69,6 +72,7 @@ impl Bench {
             What::UmaaPeer(peer) => peer.run(),
             What::Journal(bench) => bench.run(),
             What::Plan(bench) => bench.run(),
+            What::Link(bench) => bench.run(),
             What::BusPeer(peer) => peer.run(),
             What::TcpCopy(copy) => copy.run(),
             What::JournalPeer(peer) => peer.run(),

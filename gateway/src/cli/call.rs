@@ -5,6 +5,7 @@ use super::exit::Failure;
 use super::member::{Desk, Join, Member};
 use super::print_line;
 use super::within::Within;
+use aldis_envelope::aldis::link;
 use aldis_envelope::{Address, ContentType, Descriptor, Envelope, Monotonic, Now, Refusal, Role, aldis};
 use aldis_services::{Input, Outbox};
 use bytes::Bytes;
@@ -20,6 +21,7 @@ use std::time::Duration;
 #[command(after_help = "\
 Examples:
   aldis call eid400sid1 --ping             is it there, and how far away?
+  aldis call eid400sid1 --ping --wait --within 30s    how a call across a lossy link gets on
   aldis call eid400sidall --ping           every service of vehicle 400
   aldis call eid400sid1 --request aldis.NodeQuery --json
   aldis call AircraftPathPlanner --request uxas.RoutePlanRequest --content-type lmcp --file request.lmcp")]
@@ -44,6 +46,9 @@ pub(crate) struct CallArgs {
     /// How long to wait for answers: `2s`, `500ms`.
     #[arg(long, default_value = "2s")]
     within: Within,
+    /// Say how the request gets on where it crosses a lossy link: accepted, on air, delivered.
+    #[arg(long)]
+    wait: bool,
     /// One JSON object a line.
     #[arg(long)]
     json: bool,
@@ -54,6 +59,7 @@ pub(crate) struct CallArgs {
 /// What the desk tells the command.
 enum Told {
     Asked,
+    Ticket(link::CallTicket),
     Answer(Value),
     Ended(Result<(), Refusal>),
 }
@@ -81,6 +87,12 @@ impl Desk for Caller {
                 let elapsed = self.asked.map(|asked| now.monotonic - asked).unwrap_or_default();
                 Told::Answer(answer(envelope, elapsed))
             }
+            Input::Message(envelope) if envelope.message.label.descriptor() == link::TICKET => {
+                match aldis::decode(&envelope.message.content) {
+                    Some(ticket) => Told::Ticket(ticket),
+                    None => return,
+                }
+            }
             Input::CallEnded(_, outcome) => Told::Ended(outcome),
             _ => return,
         };
@@ -106,6 +118,21 @@ fn answer(envelope: &Envelope, elapsed: Duration) -> Value {
     answer
 }
 
+fn ticket_text(state: &link::CallState) -> String {
+    let seconds = |ms: &u64| *ms as f64 / 1e3;
+    match state {
+        link::CallState::Accepted(None) => "accepted".into(),
+        link::CallState::Accepted(Some(ms)) => format!("accepted, takes about {:.1} s", seconds(ms)),
+        link::CallState::OnAir(tries) => format!("on air, try {tries}"),
+        link::CallState::Delivered(ms, tries) => {
+            format!("delivered after {:.1} s, {tries} tries", seconds(ms))
+        }
+        link::CallState::Expired(tries) => format!("expired, {tries} tries"),
+        link::CallState::Cancelled(tries) => format!("taken back, {tries} tries"),
+        link::CallState::Refused(why) => format!("refused: {why}"),
+    }
+}
+
 impl CallArgs {
     /// A request without content.
     pub(super) fn request(
@@ -117,7 +144,14 @@ impl CallArgs {
     ) -> Result<Self, Failure> {
         let request = Some(descriptor(request).map_err(Failure::Usage)?);
         let content_type = ContentType::Aldis;
-        Ok(Self { address, ping: false, request, content_type, text: None, file: None, within, json, join })
+        let (ping, wait, text, file) = (false, false, None, None);
+        Ok(Self { address, ping, request, content_type, text, file, within, wait, json, join })
+    }
+
+    /// A ping that says how it gets on.
+    pub(super) fn ping(address: Address, within: Within, json: bool, join: Join) -> Self {
+        let (ping, wait, content_type) = (true, true, ContentType::Aldis);
+        Self { address, ping, request: None, content_type, text: None, file: None, within, wait, json, join }
     }
 
     pub(crate) fn run(self) -> Result<(), Failure> {
@@ -151,6 +185,7 @@ impl CallArgs {
         let ended = loop {
             match told.recv_timeout(patience) {
                 Ok(Told::Asked) => patience = self.within.0 + Duration::from_secs(1),
+                Ok(Told::Ticket(ticket)) => self.print_ticket(&ticket),
                 Ok(Told::Answer(answer)) => {
                     answers += 1;
                     self.print(&answer);
@@ -168,6 +203,15 @@ impl CallArgs {
             print_line(last);
         }
         ended
+    }
+
+    fn print_ticket(&self, ticket: &link::CallTicket) {
+        let text = ticket_text(&ticket.state);
+        if self.wait && self.json {
+            print_line(json!({ "ticket": text, "link": ticket.peer }));
+        } else if self.wait {
+            print_line(format_args!("link to {}: {text}", ticket.peer));
+        }
     }
 
     fn print(&self, answer: &Value) {

@@ -13,7 +13,7 @@ pub(crate) struct Check {
     /// The configurations.
     #[arg(required = true)]
     configs: Vec<PathBuf>,
-    /// One JSON object a file: `file`, `ok`, and where it is wrong `message`, `line`, `column`, `help`,
+    /// One JSON object a file: `file`, `ok`, `warnings` of what starves on links, and where it is wrong `message`, `line`, `column`, `help`,
     /// and `more` mistakes.
     #[arg(long)]
     json: bool,
@@ -26,10 +26,18 @@ impl Check {
             let loaded = Config::load(path);
             wrong += usize::from(loaded.is_err());
             match loaded {
-                Ok(_) if self.json => print_line(json!({ "file": path.display().to_string(), "ok": true })),
+                Ok(config) if self.json => {
+                    let warnings = super::link::starving(&config);
+                    print_line(
+                        json!({ "file": path.display().to_string(), "ok": true, "warnings": warnings }),
+                    );
+                }
                 Ok(config) => {
                     let (name, entity) = (config.name.as_str(), config.entities.own());
                     print_line(format_args!("{}: {name}, entity {entity}: good", path.display()));
+                    for warning in super::link::starving(&config) {
+                        print_line(format_args!("  warning: {warning}"));
+                    }
                 }
                 Err(error) if self.json => {
                     let place = error.position();

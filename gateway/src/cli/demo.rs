@@ -3,6 +3,7 @@
 mod board;
 mod control;
 mod fleet;
+mod linked;
 mod screen;
 mod shore;
 
@@ -31,7 +32,9 @@ const STATUS_WITHIN: Duration = Duration::from_secs(10);
 /// them each second; boat 403 is silenced for a while and comes back. A planner and an operator on shore contend for the
 /// autopilot of boat 401 (UMAA ResourceAllocation): the operator takes over by priority, the planner's time runs out.
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  aldis demo\n  aldis demo --headless --seconds 15 --json")]
+#[command(
+    after_help = "Examples:\n  aldis demo\n  aldis demo --headless --seconds 15 --json\n  aldis demo --headless --seconds 60 --link L1 --json"
+)]
 pub(crate) struct Demo {
     /// No table: only the result at the end.
     #[arg(long)]
@@ -39,6 +42,10 @@ pub(crate) struct Demo {
     /// How long. Default: until it is stopped (SIGINT or SIGTERM); with `--headless` 15.
     #[arg(long)]
     seconds: Option<u64>,
+    /// Join the boats to shore by emulated bad links in place of one bus: L1, L2, L3, L4 or WiFi. Shore then sends orders, and boat
+    /// 403 is cut off in place of being silenced.
+    #[arg(long, value_name = "PROFILE")]
+    link: Option<String>,
     /// The result as one JSON object, the last line.
     #[arg(long)]
     json: bool,
@@ -49,13 +56,15 @@ impl Demo {
         telemetry::start(&Log { level: Level::Error, format: LogFormat::Text });
         let seconds = self.seconds.or(self.headless.then_some(15)).map(Duration::from_secs);
         let board = Arc::new(Mutex::new(Board::default()));
-        let fleet = Fleet::start(&board)?;
+        let link = self.link.as_deref().map(super::link::profile).transpose()?;
+        let fleet = Fleet::start(&board, link.as_ref())?;
         let (stop, stopped) = mpsc::unbounded_channel();
         super::run::watch_signals(move || {
             let _ = stop.send(Control::Shutdown);
         })?;
         let ran = self.play(&fleet, &board, seconds, stopped);
-        let statuses = fleet.statuses(STATUS_WITHIN)?;
+        linked::drain(&board);
+        let statuses = fleet.statuses(if link.is_some() { linked::STATUS_WITHIN } else { STATUS_WITHIN })?;
         fleet.leave()?;
         let board = board.lock().unwrap_or_else(PoisonError::into_inner);
         self.report(&board.result(&statuses, ran))
@@ -100,7 +109,7 @@ impl Demo {
     }
 
     fn report(&self, result: &board::Outcome) -> Result<(), Failure> {
-        let object = json!({
+        let mut object = json!({
             "entities": result.entities,
             "envelopes_delivered": result.delivered,
             "envelopes_lost": result.lost,
@@ -116,6 +125,10 @@ impl Demo {
             "silenced": SILENCED,
             "seconds": result.ran.as_secs_f64().round(),
         });
+        if let (Some(profile), Some(linked)) = (&self.link, object.as_object_mut()) {
+            linked.insert("link".into(), json!(profile));
+            linked.extend(result.linked.object());
+        }
         if self.json {
             print_line(object);
         } else {
@@ -124,7 +137,9 @@ impl Demo {
         if result.lost > 0 {
             return Err(Failure::Failed(format!("{} envelopes were lost", result.lost)));
         }
-        if result.calls_failed_elsewhere > 0 {
+        result.linked.judge()?;
+        // On a bad link some calls come back too late.
+        if result.calls_failed_elsewhere > 0 && self.link.is_none() {
             let count = result.calls_failed_elsewhere;
             return Err(Failure::Failed(format!("{count} calls to boats that were not silenced failed")));
         }

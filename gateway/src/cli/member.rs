@@ -2,7 +2,7 @@
 
 use super::exit::Failure;
 use crate::clock;
-use crate::config::{Config, bus};
+use crate::config::Config;
 use crate::runtime::{self, Control};
 use aldis_envelope::{EntityId, Fleet, Guids, Monotonic, Now, Prefix, ServiceId, Source};
 use aldis_services::{Input, NodeConfig, Outbox, Service, ServiceSpec};
@@ -135,11 +135,11 @@ impl Member {
         desk: D,
     ) -> Result<Self, Failure> {
         let config = join.load()?;
-        let outside =
-            runtime::outside(&config).map_err(|why: bus::BusError| Failure::Usage(why.to_string()))?;
+        let outside = runtime::outside(&config).map_err(|why| Failure::Usage(why.to_string()))?;
         let mut node = runtime::node_config(&config);
         node.services = vec![desk_service(Source::new(config.entities.own(), service), prefixes, desk)];
         node.bridges.clear();
+        node.links.clear();
         // A command comes and goes: nobody is to wait for it.
         node.reliable = false;
         Self::start(node, outside)

@@ -91,6 +91,7 @@ impl Replay {
         let mut node = runtime::node_config(&config);
         node.reliable = false;
         node.bridges.clear();
+        node.links.clear();
         node.services.clear();
         let count = by_source.len();
         for (source, messages) in by_source {

@@ -86,7 +86,9 @@ impl<'a> Member<'a> {
             None if certificate.is_none() => Some(name.clone()),
             None => None,
         };
-        let entities = config.entities.iter().collect();
+        // A gateway speaks for those behind its links on its own bus.
+        let behind = config.links.iter().flat_map(super::Link::behind);
+        let entities = config.entities.iter().chain(behind).collect();
         Self { name, fleet: &config.fleet, entities, user, certificate }
     }
 

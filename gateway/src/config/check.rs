@@ -13,6 +13,7 @@ pub(super) fn check(config: &Config) -> Vec<Fault> {
     certificates(&config.bus, &mut faults);
     bridges(config, &mut faults);
     services(config, &mut faults);
+    links(config, &mut faults);
     health(config, &mut faults);
     faults.extend(config.checked_arbitration().err());
     faults
@@ -131,6 +132,24 @@ fn services(config: &Config, faults: &mut Vec<Fault>) {
                 format!("give another id; service table {} has it too", first + 1),
             ));
         }
+    }
+}
+
+fn links(config: &Config, faults: &mut Vec<Fault>) {
+    let mut known: Vec<(&str, aldis_envelope::EntityId)> = Vec::new();
+    for (index, link) in config.links.iter().enumerate() {
+        faults.extend(link.check(&config.entities).err().map(|fault| fault.below(&format!("link.{index}"))));
+        let (name, peer) = (link.name.as_str(), link.peer);
+        if known.iter().any(|(other, _)| *other == name) {
+            let message = format!("two links have the name `{name}`");
+            faults.push(Fault::new(format!("link.{index}.name"), message, "rename one"));
+        }
+        if known.iter().any(|(_, other)| *other == peer) {
+            let message = format!("two links go to entity {peer}");
+            let help = "keep one, and list both carriers in it: it changes from one to the other by itself";
+            faults.push(Fault::new(format!("link.{index}.peer"), message, help));
+        }
+        known.push((name, peer));
     }
 }
 

@@ -4,6 +4,7 @@
 use super::Ends;
 use crate::bridge::uxas_tcp::Peers;
 use crate::bus::{Bus, BusError};
+use crate::carrier::Carriers;
 use crate::clock::Clock;
 use aldis_envelope::{Dialect, Monotonic};
 use aldis_services::service::{Job, Level, Note};
@@ -77,6 +78,7 @@ pub(crate) struct Core {
     effects: Vec<Effect>,
     bus: Option<Bus>,
     peers: Peers,
+    carriers: Carriers,
     runtime: tokio::runtime::Handle,
     timer: watch::Sender<Option<Monotonic>>,
     paused: watch::Sender<bool>,
@@ -109,6 +111,7 @@ impl Core {
             effects,
             bus: None,
             peers,
+            carriers: Carriers::default(),
             runtime,
             timer,
             paused,
@@ -125,6 +128,10 @@ impl Core {
 
     pub(crate) fn peers(&mut self) -> &mut Peers {
         &mut self.peers
+    }
+
+    pub(crate) fn carriers(&mut self) -> &mut Carriers {
+        &mut self.carriers
     }
 
     /// Takes a session, or gives it up; the node is to be told by an event.
@@ -190,6 +197,8 @@ impl Core {
     fn carry_out(&mut self, now: Monotonic, effect: Effect, on: On, events: &mut Vec<Event>) {
         match effect {
             Effect::Send(bridge, peer, label, content) => self.peers.send(bridge, peer, &label, &content),
+            Effect::Transmit(link, carrier, frame) => self.carriers.send(link, carrier, &frame),
+            Effect::Found(link, carrier, place) => self.carriers.found(link, carrier, place),
             Effect::Arm(at) => {
                 self.timer.send_replace(Some(at));
             }

@@ -3,9 +3,12 @@
 use super::bus_task::Joining;
 use crate::bridge::uxas_tcp::{Endpoint, Side};
 use crate::bus::Congestion;
+use crate::carrier::{serial, udp};
 use crate::clock;
 use crate::config::{self, Config, bus};
 use aldis_envelope::{EntityId, Guids, Source};
+use aldis_services::LinkId;
+use aldis_services::link::{CarrierId, LinkKey};
 use aldis_services::registry::{self, Kind};
 use aldis_services::{BridgeSpec, NodeConfig, ServiceSpec};
 
@@ -13,13 +16,39 @@ use aldis_services::{BridgeSpec, NodeConfig, ServiceSpec};
 pub(crate) struct Outside {
     pub(super) bus: Joining,
     pub(super) bridges: Vec<Endpoint>,
+    /// The keys of each link.
+    pub(super) link_keys: Vec<Vec<LinkKey>>,
+    pub(super) udp: Vec<udp::Port>,
+    pub(super) lines: Vec<serial::Line>,
+}
+
+impl Outside {
+    /// Without the carriers of links that the node does not have: the command line takes the rest of a configuration, and none of
+    /// its links.
+    pub(super) fn for_links(mut self, links: usize) -> Self {
+        self.udp.iter_mut().for_each(|port| port.ends.retain(|end| end.link.0 < links));
+        self.udp.retain(|port| !port.ends.is_empty());
+        self.lines.retain(|line| line.link.0 < links);
+        self
+    }
+}
+
+/// Why the outside of a configuration cannot be opened.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum OutsideError {
+    /// The bus.
+    #[error(transparent)]
+    Bus(#[from] bus::BusError),
+    /// A key of a link.
+    #[error(transparent)]
+    Key(#[from] config::KeyError),
 }
 
 /// What the shell opens for a configuration.
 ///
 /// # Errors
-/// A file of the `[bus]` table that cannot be read, or what Zenoh refuses.
-pub(crate) fn outside(config: &Config) -> Result<Outside, bus::BusError> {
+/// A file of the `[bus]` table or a key that cannot be read, or what Zenoh refuses.
+pub(crate) fn outside(config: &Config) -> Result<Outside, OutsideError> {
     let congestion = match config.bus.congestion {
         bus::Congestion::Block => Congestion::Block,
         bus::Congestion::Drop => Congestion::Drop,
@@ -32,7 +61,31 @@ pub(crate) fn outside(config: &Config) -> Result<Outside, bus::BusError> {
         },
         message_bytes_max: bridge.message_bytes_max as usize,
     });
-    Ok(Outside { bus, bridges: bridges.collect() })
+    let link_keys = config.links.iter().map(|link| link.keys.iter().map(config::KeyFile::read).collect());
+    let link_keys = link_keys.collect::<Result<_, _>>()?;
+    let (udp, lines) = carriers(config);
+    Ok(Outside { bus, bridges: bridges.collect(), link_keys, udp, lines })
+}
+
+/// The carriers of all links; those that listen at one address share a socket.
+fn carriers(config: &Config) -> (Vec<udp::Port>, Vec<serial::Line>) {
+    let (mut ports, mut lines): (Vec<udp::Port>, _) = (Vec::new(), Vec::new());
+    for (link, configured) in config.links.iter().enumerate() {
+        for (place, carrier) in configured.carriers.iter().enumerate() {
+            let (link, id, mtu) = (LinkId(link), CarrierId(place as u8), carrier.mtu as usize);
+            if let (config::CarrierKind::Udp, Some(listen)) = (carrier.kind, carrier.listen) {
+                let end = udp::End { link, carrier: id, entity: configured.peer, address: carrier.peer, mtu };
+                match ports.iter_mut().find(|port| port.listen == listen && listen.port() != 0) {
+                    Some(port) => port.ends.push(end),
+                    None => ports.push(udp::Port { listen, ends: vec![end] }),
+                }
+            }
+            if let (Some(device), Some(baud)) = (&carrier.device, carrier.baud) {
+                lines.push(serial::Line { link, carrier: id, device: device.clone(), baud, mtu });
+            }
+        }
+    }
+    (ports, lines)
 }
 
 /// The node of a configuration, in a new life.
@@ -54,6 +107,8 @@ pub(crate) fn node_config(config: &Config) -> NodeConfig {
         reliable: true,
         services,
         bridges: config.bridges.iter().map(|bridge| bridge_spec(own, bridge)).collect(),
+        links: config.links.iter().map(|link| link.spec(own)).collect(),
+        journaled: false,
     }
 }
 

@@ -1,5 +1,6 @@
 //! All that a link can be told, and all that it can ask for.
 
+use super::export::Newest;
 use super::path::CarrierId;
 use super::seal::LinkKey;
 use aldis_envelope::{Envelope, Monotonic};
@@ -57,6 +58,24 @@ pub struct Offer {
     pub class: Class,
     /// For a state: the least time between two samples of its instance.
     pub interval: Duration,
+    /// For a state: what counts as one thing, of which the newest is enough.
+    pub newest: Newest,
+    /// The number of the rule that lets it cross, and the part of the link's bytes that all under that rule may take, in per cent.
+    pub share: (u32, u8),
+}
+
+impl Offer {
+    /// A message under no rule.
+    pub fn new(ticket: Ticket, envelope: Envelope, class: Class) -> Self {
+        Self {
+            ticket,
+            envelope,
+            class,
+            interval: Duration::ZERO,
+            newest: Newest::Instance,
+            share: (u32::MAX, 100),
+        }
+    }
 }
 
 /// Something that happened.

@@ -1,7 +1,7 @@
 //! Export rules: what crosses a link, and how. What no rule names does not cross.
 
-use super::Class;
-use aldis_envelope::{EntityId, Envelope, Prefix};
+use super::{Class, LinkConfig};
+use aldis_envelope::{Address, EntityId, Envelope, Label, Prefix, Role};
 use std::collections::BTreeSet;
 use std::time::Duration;
 
@@ -51,11 +51,15 @@ impl Rule {
         }
     }
 
-    fn matches(&self, envelope: &Envelope) -> bool {
-        let label = &envelope.message.label;
+    fn matches(&self, label: &Label) -> bool {
         label.descriptor().starts_with(&self.descriptor)
             && self.address.as_ref().is_none_or(|prefix| prefix.matches(&label.address))
             && (self.sources.is_empty() || self.sources.contains(&label.source().entity))
+    }
+
+    /// What must be subscribed to so that all broadcasts are seen that the rule may name.
+    fn prefix(&self) -> Option<Prefix> {
+        self.address.clone().or_else(|| Prefix::new(&self.descriptor).ok())
     }
 }
 
@@ -95,41 +99,88 @@ pub struct Export {
 }
 
 impl Export {
-    /// Whether and how a message crosses. `destination` is the entity that its content is for, where that is known: a command keeps
-    /// its topic as its address, but goes towards its destination alone.
+    /// Which rule names messages with a label, from 0.
+    ///
+    /// # Errors
+    /// Why they stay.
+    pub fn rule_of(&self, label: &Label) -> Result<usize, Stays> {
+        if self.behind.contains(&label.source().entity) {
+            return Err(Stays::FromThere);
+        }
+        if label.address.entity().is_some_and(|to| !self.behind.contains(&to)) {
+            return Err(Stays::OtherEntity);
+        }
+        self.rules.iter().position(|rule| rule.matches(label)).ok_or(Stays::NoRule)
+    }
+
+    /// How a message crosses by the rule that names its label. `destination` is the entity that its content is for, where that is
+    /// known: a command keeps its topic as its address, but goes towards its destination alone.
     ///
     /// # Errors
     /// Why it stays.
-    pub fn decide(&self, envelope: &Envelope, destination: Option<EntityId>) -> Result<Treatment, Stays> {
-        let label = &envelope.message.label;
-        if self.behind.contains(&label.source().entity) || self.behind.contains(&envelope.stamp.node) {
+    pub fn treat(
+        &self,
+        number: usize,
+        envelope: &Envelope,
+        destination: Option<EntityId>,
+    ) -> Result<Treatment, Stays> {
+        if self.behind.contains(&envelope.stamp.node) {
             return Err(Stays::FromThere);
         }
-        let to = destination.or_else(|| label.address.entity());
-        if to.is_some_and(|to| !self.behind.contains(&to)) {
+        if destination.is_some_and(|to| !self.behind.contains(&to)) {
             return Err(Stays::OtherEntity);
         }
-        let found = self.rules.iter().enumerate().find(|(_, rule)| rule.matches(envelope));
-        let (number, rule) = found.ok_or(Stays::NoRule)?;
+        let rule = self.rules.get(number).ok_or(Stays::NoRule)?;
         let own = envelope.stamp.lifespan_left_ms;
         let given = rule.lifespan.map(|lifespan| lifespan.as_millis().min(u32::MAX.into()) as u32);
+        let call = envelope.message.call.as_deref();
+        // Who has called waits no longer than this.
+        let waits = call.and_then(|call| match call.role {
+            Role::Request { time_left_ms } => Some(time_left_ms),
+            _ => None,
+        });
         // A part of a call is for one receiver and is not repeated: it is a command whatever the rule makes of its like.
-        let class = if envelope.message.call.is_some() { Class::Command } else { rule.class };
+        let class = if call.is_some() { Class::Command } else { rule.class };
         Ok(Treatment {
             class,
-            lifespan_left_ms: own.into_iter().chain(given).min(),
+            lifespan_left_ms: own.into_iter().chain(given).chain(waits).min(),
             interval: rule.interval,
             newest: rule.newest,
             rule: number,
         })
     }
+
+    /// Both at once, for a message that is met once.
+    ///
+    /// # Errors
+    /// Why it stays.
+    pub fn decide(&self, envelope: &Envelope, destination: Option<EntityId>) -> Result<Treatment, Stays> {
+        self.treat(self.rule_of(&envelope.message.label)?, envelope, destination)
+    }
+
+    /// What must be subscribed to so that all that may cross is seen: what is for the entities behind the link, and what rules name.
+    pub fn prefixes(&self) -> Vec<Prefix> {
+        let behind = self.behind.iter().map(|&entity| Prefix::Id(Address::Entity(entity)));
+        behind.chain(self.rules.iter().filter_map(Rule::prefix)).collect()
+    }
+}
+
+/// A link of a node: its two ends and what crosses.
+#[derive(Debug, Clone)]
+pub struct LinkSpec {
+    /// Its name, for people.
+    pub name: String,
+    /// The protocol's part.
+    pub link: LinkConfig,
+    /// What crosses.
+    pub export: Export,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::link::body::tests::envelope;
-    use aldis_envelope::{Address, Call, CallId, Label, Role};
+    use aldis_envelope::{Call, CallId};
     use std::sync::Arc;
 
     fn entity(number: u64) -> EntityId {

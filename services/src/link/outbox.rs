@@ -265,6 +265,32 @@ impl Outbox {
         self.timers.insert((flight.next, number));
     }
 
+    /// How often a command was sent whole; none where it waits for its first turn.
+    pub(super) fn tries(&self, number: u64) -> Option<u32> {
+        self.flights.get(&number).map(|flight| flight.copies)
+    }
+
+    /// Whether a command may be sent: it is written down.
+    pub(super) fn is_safe(&self, number: u64) -> bool {
+        self.flights.contains_key(&number)
+            || self.entries.get(&number).is_some_and(|e| self.is_ready(number, e))
+    }
+
+    fn is_ready(&self, number: u64, entry: &Entry) -> bool {
+        self.ready.contains(&(entry.urgency, entry.expires.unwrap_or(NEVER), number))
+    }
+
+    /// How many commands go out before one that waits for its first turn.
+    pub(super) fn waiting_before(&self, number: u64) -> usize {
+        let Some(entry) = self.entries.get(&number) else { return 0 };
+        let place = (entry.urgency, entry.expires.unwrap_or(NEVER), number);
+        self.ready.range(..place).count() + self.flights.len()
+    }
+
+    pub(super) fn largest_ticket(&self) -> Ticket {
+        self.entries.values().map(|entry| entry.ticket).max().unwrap_or_default()
+    }
+
     pub(super) fn numbers(&self) -> Vec<u64> {
         self.entries.keys().copied().collect()
     }

@@ -6,7 +6,7 @@ use super::frame::{Head, session_byte};
 use super::outbox::Hedge;
 use super::seal::{FrameId, LinkKey, TAG_BYTES, seal};
 use super::sent::{Carried, SentFrame};
-use super::{Compare, Effect, Link};
+use super::{Compare, Effect, Link, TicketState};
 use aldis_envelope::{Monotonic, Now};
 use fill::Load;
 use std::time::Duration;
@@ -44,12 +44,16 @@ impl Link {
                 self.counters.frames_sent += 1;
                 self.counters.bytes_sent += frame.len() as u64;
                 effects.push(Effect::Transmit(path.config.id, frame));
+                let gone_out = self.gone_out.drain(..);
+                effects.extend(
+                    gone_out.map(|(ticket, tries)| Effect::Ticket(ticket, TicketState::OnAir { tries })),
+                );
             }
         }
     }
 
     /// The carrier that data goes by: the first that is heard; while none is, they take turns.
-    fn active(&self, now: Monotonic) -> Option<usize> {
+    pub(super) fn active(&self, now: Monotonic) -> Option<usize> {
         let heard = self.paths.iter().position(|path| path.is_heard(now));
         heard.or_else(|| {
             let up: Vec<_> = (0..self.paths.len()).filter(|&index| self.paths[index].up).collect();

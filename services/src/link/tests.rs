@@ -80,7 +80,7 @@ impl End {
     }
 
     fn offer(&mut self, at: u64, ticket: u64, envelope: Envelope, class: Class) {
-        let offer = Offer { ticket: Ticket(ticket), envelope, class, interval: Duration::ZERO };
+        let offer = Offer::new(Ticket(ticket), envelope, class);
         self.give(at, Event::Offer(offer));
     }
 

@@ -31,14 +31,14 @@ impl Node {
         }
     }
 
-    /// Every counter of the node and of its bridges, those of a bridge with its name before.
+    /// Every counter of the node, of its bridges and links, those of a bridge or link with its name before.
     pub fn all_counters(&self) -> Vec<(String, u64)> {
         let own = self.counters.list().into_iter().map(|(name, value)| (name.to_owned(), value));
         let bridges = self.bridges.iter().flat_map(|bridge| {
             let prefix = &bridge.spec.name;
             bridge.counters.list().into_iter().map(move |(name, value)| (format!("{prefix}.{name}"), value))
         });
-        own.chain(bridges).collect()
+        own.chain(bridges).chain(self.links.counters()).collect()
     }
 
     /// Answers a request in the name of a service.

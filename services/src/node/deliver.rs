@@ -1,6 +1,6 @@
 //! Where messages go: to services here, to peers of bridges, out on the bus.
 
-use super::{Node, Origin, Work, sharing};
+use super::{Node, Origin, Passed, Work, sharing};
 use crate::dds::Step;
 use crate::event::{BridgeId, Effect, PeerId, PublisherId};
 use crate::labels::{Entry, Standing};
@@ -23,19 +23,26 @@ const INSTANCE_PUBLISHERS_MAX: usize = 64;
 impl Node {
     /// A message that starts here: it is stamped, and goes everywhere.
     pub(super) fn route(&mut self, now: Now, work: Work, effects: &mut Vec<Effect>) {
-        let Work { origin, message, confirm } = work;
+        let Work { origin, message, confirm, passed } = work;
         let place = self.label(&message.label);
         let (outgoing, publish) = self.outgoing(place);
         let (sequence, skipped) = self.outbound.next(outgoing);
-        let stamp = Stamp {
-            node: self.entity(),
-            boot: self.config.boot,
-            sequence,
-            source_time: now.wall,
-            lifespan_left_ms: None,
-            priority: Priority::Data,
-            skipped,
-            via: Vec::new(),
+        let (node, boot) = (self.entity(), self.config.boot);
+        let stamp = match passed {
+            None => Stamp {
+                node,
+                boot,
+                sequence,
+                source_time: now.wall,
+                lifespan_left_ms: None,
+                priority: Priority::Data,
+                skipped,
+                via: Vec::new(),
+            },
+            Some(passed) => {
+                let Passed { source_time, lifespan_left_ms, priority, via } = *passed;
+                Stamp { node, boot, sequence, source_time, lifespan_left_ms, priority, skipped, via }
+            }
         };
         let envelope = Envelope { message, stamp };
         let qos = self.labels.entry(place).qos;
@@ -77,7 +84,7 @@ impl Node {
         if !entry.import {
             return;
         }
-        if let Some(qos) = entry.qos.filter(|_| !entry.services.is_empty()) {
+        if let Some(qos) = entry.qos.filter(|_| !entry.services.is_empty() || !entry.links.is_empty()) {
             let mut step = Step::default();
             self.sharing.reading.sample(now.monotonic, qos, envelope, &mut step);
             self.take_step(now, step, effects);
@@ -138,6 +145,10 @@ impl Node {
             let bridge = self.labels.entry(place).bridges[i];
             self.export(now, origin, bridge, envelope, effects);
         }
+        for i in 0..self.labels.entry(place).links.len() {
+            let link = self.labels.entry(place).links[i];
+            self.export_by_link(now, origin, link, envelope, effects);
+        }
     }
 
     fn deliver(&mut self, now: Now, service: usize, envelope: &Envelope, effects: &mut Vec<Effect>) {
@@ -170,6 +181,10 @@ impl Node {
         } else if own.service == ServiceId::NODE && label.descriptor() == aldis::NODE_QUERY {
             let status = aldis::encode(&self.status(now)).into();
             self.reply_as_host(service, request, aldis::NODE_STATUS, status);
+        } else if own.service == ServiceId::NODE
+            && let Some((descriptor, content)) = self.answer_about_links(now, request)
+        {
+            self.reply_as_host(service, request, descriptor, content);
         } else {
             self.counters.delivered += 1;
             self.run(now, service, Input::Message(request), effects);
@@ -343,6 +358,7 @@ impl Node {
             label: label.clone(),
             services,
             bridges,
+            links: self.links.naming(label),
             publish: matches(&self.config.export),
             import: matches(&self.config.import),
             qos: self.sharing.topics.of(address).filter(|_| label.is_broadcast()),

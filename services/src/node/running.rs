@@ -18,6 +18,7 @@ impl Node {
         let source = self.services[place].spec.source;
         let running = self.services[place].is_running();
         self.awake.push_back(place);
+        self.links.services_changed();
         if running && self.bus_is_open {
             effects.push(Effect::Token(source, true));
         }
@@ -45,6 +46,7 @@ impl Node {
         let Ran::Crashed(text) = ran else { return };
         let source = self.services[place].spec.source;
         self.counters.crashes += 1;
+        self.links.services_changed();
         if self.bus_is_open {
             effects.push(Effect::Token(source, false));
         }
@@ -80,6 +82,7 @@ impl Node {
                 Action::Note(note) => self.note(now, note, effects),
                 Action::Retire => {
                     self.services[place].retire();
+                    self.links.services_changed();
                     if self.bus_is_open {
                         effects.push(Effect::Token(source, false));
                     }
@@ -119,7 +122,9 @@ impl Node {
     ) {
         let Some(id) = message.call.as_ref().map(|call| call.id) else { return };
         let (source, to) = (message.label.source(), message.label.address.clone());
-        let here = matches!(&to, Address::Service(s) if self.is_alive_here(*s));
+        // Who is behind a link may answer later: what is for them waits for it.
+        let here = matches!(&to, Address::Service(s) if self.is_alive_here(*s))
+            || to.entity().is_some_and(|entity| self.links.is_behind(entity));
         let nobody = crate::calls::Alive::default();
         let alive = if here { &nobody } else { &self.alive };
         match self.calls.open(source.service, id, &to, now.monotonic + within, alive) {
@@ -191,6 +196,7 @@ impl Node {
             }
         }
         self.sharing_due(now, effects);
+        self.links_due(now, effects);
         self.give_up_stalled_peers(now, effects);
     }
 

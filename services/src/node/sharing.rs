@@ -111,13 +111,18 @@ impl Node {
     /// Who reads what has changed, or who is on the bus: all are told.
     pub(super) fn readers_changed(&mut self, now: Now, effects: &mut Vec<Effect>) {
         let mut prefixes: Vec<Prefix> = self.services.iter().flat_map(|h| h.subscribed().cloned()).collect();
+        // What crosses a link is read here for the far side.
+        prefixes.extend(self.links.prefixes().filter(|prefix| !matches!(prefix, Prefix::Id(_))));
         prefixes.sort();
         prefixes.dedup();
         if prefixes == self.sharing.prefixes {
             return;
         }
-        let services = &self.services;
-        self.sharing.reading.retain(|address| services.iter().any(|hosted| hosted.receives(address)));
+        let (services, links) = (&self.services, &self.links);
+        let is_read = |address: &Address| {
+            services.iter().any(|hosted| hosted.receives(address)) || links.reads(address)
+        };
+        self.sharing.reading.retain(is_read);
         self.sharing.prefixes = prefixes;
         self.sharing.number += 1;
         self.announce(now, None, effects);
@@ -219,9 +224,9 @@ impl Node {
         if told.to != self.config.boot {
             return;
         }
-        let (services, topics) = (&self.services, &self.sharing.topics);
+        let (services, links, topics) = (&self.services, &self.links, &self.sharing.topics);
         let qos = |address: &Address| {
-            let is_read = services.iter().any(|hosted| hosted.receives(address));
+            let is_read = services.iter().any(|hosted| hosted.receives(address)) || links.reads(address);
             topics.of(address).filter(|_| is_read)
         };
         self.sharing.reading.ends(now.monotonic, from, &told.ends, qos, step);

@@ -1,5 +1,6 @@
 //! Whole nodes in the simulator: what a fleet must see.
 
+mod links;
 mod sharing;
 
 use super::*;
@@ -94,6 +95,8 @@ fn config(entities: &[u64], services: Vec<ServiceSpec>) -> NodeConfig {
         export: vec![Prefix::all()],
         services: all,
         bridges: Vec::new(),
+        links: Vec::new(),
+        journaled: false,
     }
 }
 

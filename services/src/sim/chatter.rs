@@ -123,6 +123,8 @@ impl Workload for Chatter {
                 export: vec![Prefix::all()],
                 services,
                 bridges: Vec::new(),
+                links: Vec::new(),
+                journaled: false,
             }
         };
         entities.iter().map(node).collect()

@@ -9,9 +9,9 @@ mod rows;
 mod swarm;
 mod world;
 
-pub use bench::{Bench, Row, bench};
+pub use bench::{Bench, Row, bench, row_names};
 pub use crash::{CrashReport, crash};
 pub use disk::Disk;
 pub use emulator::{Burst, Profile, Way};
-pub use swarm::{SwarmReport, swarm};
+pub use swarm::{SwarmReport, swarm, swarm_one};
 pub use world::{LinkWorld, Machine, MachineId, Port, Seen, What};

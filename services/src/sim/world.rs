@@ -3,6 +3,7 @@
 
 mod bus;
 mod faults;
+mod links;
 mod storage;
 
 use super::machine::{Clocks, Machine};
@@ -68,6 +69,7 @@ pub struct World {
     delay: (Duration, Duration),
     /// The share of samples that the bus drops because somebody does not keep up.
     sample_loss: f64,
+    links: links::Links,
     facts: Facts,
     checkers: Vec<Box<dyn Checker>>,
     violations: Vec<Violation>,
@@ -87,6 +89,7 @@ impl World {
             last_arrival: BTreeMap::new(),
             delay,
             sample_loss: 0.0,
+            links: links::Links::default(),
             facts: Facts::default(),
             checkers: Vec::new(),
             violations: Vec::new(),
@@ -124,6 +127,7 @@ impl World {
         let boot = machine.config.boot;
         self.observe(place, Seen::Started(boot));
         self.handle(place, Vec::new());
+        self.open_links(place);
         self.open_bus(NodeHandle(place));
     }
 
@@ -305,7 +309,9 @@ impl World {
             }
             Effect::Exit => machine.exited = true,
             Effect::Say(note) => self.observe(place, Seen::Said(&note)),
-            Effect::PauseInput(_) => {}
+            Effect::Transmit(link, carrier, frame) => self.transmit(place, link, carrier, frame),
+            Effect::Persist(number, records) => self.persist(place, number, records),
+            Effect::PauseInput(_) | Effect::Found(..) => {}
         }
     }
 

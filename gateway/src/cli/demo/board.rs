@@ -1,5 +1,6 @@
 //! What shore knows of the fleet: the numbers behind the table and the result.
 
+use super::linked::Linked;
 use aldis_envelope::aldis::NodeStatus;
 use aldis_envelope::umaa::ErrorCondition;
 use aldis_envelope::{EntityId, Monotonic};
@@ -58,6 +59,8 @@ pub(super) struct Board {
     pub(super) control: Control,
     /// The boat that is silenced now.
     pub(super) silenced: Option<u64>,
+    /// What is known of bad links, where the boats are behind some.
+    pub(super) linked: Linked,
     /// Calls that failed though the boat was not silenced when they were made.
     pub(super) failed_elsewhere: u64,
 }
@@ -73,6 +76,7 @@ pub(super) struct Outcome {
     pub(super) calls_failed: u64,
     pub(super) calls_failed_elsewhere: u64,
     pub(super) control: Control,
+    pub(super) linked: Linked,
     pub(super) ran: Duration,
 }
 
@@ -93,6 +97,7 @@ impl Board {
             calls_failed: self.boats.values().map(|boat| boat.calls_failed).sum(),
             calls_failed_elsewhere: self.failed_elsewhere,
             control: self.control.clone(),
+            linked: self.linked.clone(),
             ran,
         }
     }

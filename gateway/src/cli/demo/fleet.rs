@@ -2,14 +2,17 @@
 
 use super::board::{BOATS, Board, CONTENDED, SILENCED};
 use super::control::{self, Contender, Habit};
+use super::linked;
 use super::shore::ShoreDesk;
 use crate::cli::exit::Failure;
+use crate::cli::link::relay::Running;
 use crate::cli::member::{Member, desk_service};
 use crate::config::Config;
 use crate::runtime::{self, Control};
 use aldis_envelope::aldis::NodeStatus;
 use aldis_envelope::umaa::{HealthReport, ResourceAllocationReport, Topic};
 use aldis_envelope::{EntityId, GuidForm, Guids, Prefix, ServiceId, Source};
+use aldis_services::sim::link::Profile;
 use aldis_services::{ServiceSpec, track};
 use std::net::TcpListener;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,6 +28,8 @@ pub(super) struct Fleet {
     boats: Vec<Member>,
     finish: Arc<AtomicBool>,
     statuses: mpsc::Receiver<Vec<NodeStatus>>,
+    /// The bad links, one a boat, where there are any.
+    relays: Vec<Running>,
 }
 
 fn failed<E: std::fmt::Display>(why: E) -> Failure {
@@ -33,7 +38,7 @@ fn failed<E: std::fmt::Display>(why: E) -> Failure {
 
 impl Fleet {
     /// Starts shore, then the boats.
-    pub(super) fn start(board: &Arc<Mutex<Board>>) -> Result<Self, Failure> {
+    pub(super) fn start(board: &Arc<Mutex<Board>>, link: Option<&Profile>) -> Result<Self, Failure> {
         let port = TcpListener::bind("127.0.0.1:0")
             .and_then(|listener| listener.local_addr())
             .map_err(failed)?
@@ -42,7 +47,7 @@ impl Fleet {
         let finish = Arc::new(AtomicBool::new(false));
         let boats = BOATS.map(EntityId::new).into_iter().collect::<Result<Vec<_>, _>>().map_err(failed)?;
         let guids = Guids::new(&aldis_envelope::Fleet::new(FLEET).map_err(failed)?, GuidForm::Readable);
-        let desk = ShoreDesk::new(board.clone(), guids.clone(), boats, finish.clone(), tell);
+        let desk = ShoreDesk::new(board.clone(), guids.clone(), boats, finish.clone(), tell).over(link);
         let entity = EntityId::new(1).map_err(failed)?;
         let source = Source::new(entity, ServiceId::new(100).map_err(failed)?);
         let prefixes =
@@ -50,15 +55,34 @@ impl Fleet {
         let prefixes = prefixes.into_iter().collect::<Result<Vec<_>, _>>().map_err(failed)?;
         let mut services = vec![desk_service(source, prefixes, desk)];
         services.extend(contenders(board, &guids, entity)?);
-        let shore = start(&shore_text(port), services)?;
-        let boats =
-            BOATS.iter().map(|&boat| start(&boat_text(boat, port), Vec::new())).collect::<Result<_, _>>()?;
-        Ok(Self { shore, boats, finish, statuses })
+        let Some(profile) = link else {
+            let shore = start(&shore_text(port), services)?;
+            let boats = BOATS.iter().map(|&boat| start(&boat_text(boat, port), Vec::new()));
+            return Ok(Self {
+                shore,
+                boats: boats.collect::<Result<_, _>>()?,
+                finish,
+                statuses,
+                relays: Vec::new(),
+            });
+        };
+        services.push(linked::orderer(board, entity)?);
+        let (relays, texts) = linked::links(profile)?;
+        let shore = start(&(shore_text(port) + &texts.shore), services)?;
+        let boats = BOATS.iter().zip(&texts.boats).map(|(&boat, text)| {
+            let alone = boat_text(boat, port).replace("mode = \"client\"", "mode = \"peer\"");
+            let alone: Vec<_> = alone.lines().filter(|line| !line.starts_with("connect")).collect();
+            start(&(alone.join("\n") + "\n" + text), vec![linked::taker(board, boat)?])
+        });
+        Ok(Self { shore, boats: boats.collect::<Result<_, _>>()?, finish, statuses, relays })
     }
 
     /// Silences the boat, or lets it come back.
     pub(super) fn silence(&self, silent: bool) {
         let boat = BOATS.iter().position(|&boat| boat == SILENCED);
+        if let Some(relay) = boat.and_then(|boat| self.relays.get(boat)) {
+            return relay.cut(silent);
+        }
         if let Some(member) = boat.and_then(|boat| self.boats.get(boat)) {
             // A node that has ended is as silent as can be.
             let _ = member.control().send(Control::Silence(silent));

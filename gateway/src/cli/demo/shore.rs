@@ -1,6 +1,7 @@
 //! The shore station's service: hears the boats, and calls them each second.
 
 use super::board::{Board, SILENCED};
+use super::linked;
 use crate::cli::member::Desk;
 use aldis_envelope::aldis::{self, NodeStatus};
 use aldis_envelope::umaa::{self, ErrorCondition, HealthReport, ResourceAllocationReport, Topic};
@@ -8,6 +9,7 @@ use aldis_envelope::{
     Address, CallId, Change, ContentType, Descriptor, EntityId, Envelope, Guid, Guids, Message, Monotonic,
     Now, Refusal, ServiceId, Source, Wall, lmcp,
 };
+use aldis_services::sim::link::Profile;
 use aldis_services::{Input, Outbox, track};
 use bytes::Bytes;
 use std::collections::BTreeMap;
@@ -17,6 +19,9 @@ use std::time::Duration;
 
 /// How often each boat is called.
 const CALL_EVERY: Duration = Duration::from_secs(1);
+/// Over bad links boats are called less often, and have more time.
+const CALL_EVERY_LINKED: Duration = Duration::from_secs(10);
+const CALL_WITHIN_LINKED: Duration = Duration::from_secs(8);
 /// How often the desk looks at the time, and whether it is to finish.
 const TICK: Duration = Duration::from_millis(100);
 /// How long a call may take: several hundred times a round trip here.
@@ -42,6 +47,7 @@ pub(super) struct ShoreDesk {
     next: Option<Monotonic>,
     next_call: Option<Monotonic>,
     finishing: bool,
+    is_linked: bool,
 }
 
 impl ShoreDesk {
@@ -64,7 +70,28 @@ impl ShoreDesk {
             next: None,
             next_call: None,
             finishing: false,
+            is_linked: false,
         }
+    }
+
+    /// The boats are behind bad links, or not.
+    pub(super) fn over(self, link: Option<&Profile>) -> Self {
+        Self { is_linked: link.is_some(), ..self }
+    }
+
+    fn call_every(&self) -> Duration {
+        if self.is_linked { CALL_EVERY_LINKED } else { CALL_EVERY }
+    }
+
+    fn call(&self, entity: EntityId, request: &str, out: &mut Outbox) -> Option<CallId> {
+        let to = Address::Service(Source::new(entity, ServiceId::NODE));
+        let descriptor = Descriptor::new(request).ok()?;
+        let within = match (self.is_linked, self.finishing) {
+            (false, _) => CALL_WITHIN,
+            (true, false) => CALL_WITHIN_LINKED,
+            (true, true) => linked::STATUS_WITHIN,
+        };
+        Some(out.call(to, ContentType::Aldis, descriptor, Bytes::new(), within))
     }
 
     fn board(&self) -> MutexGuard<'_, Board> {
@@ -77,7 +104,7 @@ impl ShoreDesk {
         if self.finish.load(Ordering::Relaxed) {
             self.ask_statuses(out);
         } else if self.next_call.is_none_or(|at| at <= now.monotonic) {
-            self.next_call = Some(now.monotonic + CALL_EVERY);
+            self.next_call = Some(now.monotonic + self.call_every());
             self.call_boats(now, out);
         }
     }
@@ -89,7 +116,7 @@ impl ShoreDesk {
             if !self.board().boats.contains_key(&boat) {
                 continue;
             }
-            if let Some(id) = call(boat, aldis::PING, out) {
+            if let Some(id) = self.call(boat, aldis::PING, out) {
                 let is_silenced = silenced == Some(boat.get());
                 self.open.insert(id, Purpose::Ping(boat, now.monotonic, is_silenced));
             }
@@ -102,7 +129,7 @@ impl ShoreDesk {
         }
         let own = out.source().entity;
         for entity in self.boats.clone().into_iter().chain([own]) {
-            if let Some(id) = call(entity, aldis::NODE_QUERY, out) {
+            if let Some(id) = self.call(entity, aldis::NODE_QUERY, out) {
                 self.open.insert(id, Purpose::Status);
             }
         }
@@ -114,6 +141,9 @@ impl ShoreDesk {
         if message.label.descriptor() == track::DESCRIPTOR {
             let position = lmcp::position(&message.content);
             let mut board = self.board();
+            if self.is_linked {
+                board.linked.heard(entity, now.wall.0 - envelope.stamp.source_time.0);
+            }
             let boat = board.boats.entry(entity).or_default();
             boat.heard = Some(now.monotonic);
             boat.states += 1;
@@ -172,12 +202,6 @@ impl ShoreDesk {
             let _ = self.tell.send(std::mem::take(&mut self.statuses));
         }
     }
-}
-
-fn call(entity: EntityId, request: &str, out: &mut Outbox) -> Option<CallId> {
-    let to = Address::Service(Source::new(entity, ServiceId::NODE));
-    let descriptor = Descriptor::new(request).ok()?;
-    Some(out.call(to, ContentType::Aldis, descriptor, Bytes::new(), CALL_WITHIN))
 }
 
 /// The worst of some conditions. Their numbers on the wire are alphabetical, not by badness.

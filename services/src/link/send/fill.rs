@@ -6,7 +6,7 @@ use crate::link::outbox::LIFESPAN_UNIT;
 use crate::link::sent::Carried;
 use crate::link::state::Sample;
 use crate::link::wire::{put_zigzag, varint_len};
-use crate::link::{Compare, Link, body};
+use crate::link::{Compare, Link, Ticket, body};
 use aldis_envelope::{Monotonic, Now};
 use std::time::Duration;
 
@@ -175,10 +175,18 @@ impl Link {
             load.push(Chosen::Command { number, start, end }, bytes + content, Some(content));
             load.carried.push(Carried::Command { number, start, end });
             self.counters.command_copies += 1;
+            self.note_copy(number, end);
             if probing {
                 break;
             }
         }
+    }
+
+    /// The sender is told of each whole copy.
+    fn note_copy(&mut self, number: u64, end: u32) {
+        let entry = self.outbox.entry(number).filter(|entry| end as usize == entry.body.len());
+        let ticket = entry.map(|entry| entry.ticket).filter(|ticket| *ticket != Ticket::default());
+        self.gone_out.extend(ticket.zip(self.outbox.tries(number)));
     }
 
     fn fill_states(&mut self, now: Monotonic, index: usize, load: &mut Load) {

@@ -57,9 +57,9 @@ impl Bench {
 /// How a row is measured.
 type Measure = fn(&Bench) -> Row;
 
-/// Measures the rows that have a goal on this link.
-pub fn bench(bench: &Bench) -> Vec<Row> {
-    let rows: &[(&str, Measure)] = match bench.profile.name {
+/// The rows that have a goal on a link.
+fn rows_of(profile: &Profile) -> &'static [(&'static str, Measure)] {
+    match profile.name {
         "L1" => &[
             ("G1", g1),
             ("G2", g2),
@@ -82,8 +82,18 @@ pub fn bench(bench: &Bench) -> Vec<Row> {
         "L3" => &[("G1", g1), ("G3", g3), ("G12", g12)],
         "L4" => &[("G1", g1), ("G3", g3), ("G4", g4), ("G5", g5)],
         _ => &[("G1", g1), ("G2", g2_wifi), ("G3", g3)],
-    };
-    rows.iter().filter(|(name, _)| bench.wants(name)).map(|(_, row)| row(bench)).collect()
+    }
+}
+
+/// The names of the rows that have a goal on a link.
+pub fn row_names(profile: &Profile) -> Vec<&'static str> {
+    rows_of(profile).iter().map(|(name, _)| *name).collect()
+}
+
+/// Measures the rows that have a goal on this link.
+pub fn bench(bench: &Bench) -> Vec<Row> {
+    let rows = rows_of(&bench.profile).iter();
+    rows.filter(|(name, _)| bench.wants(name)).map(|(_, row)| row(bench)).collect()
 }
 
 fn g1(bench: &Bench) -> Row {

@@ -23,6 +23,8 @@ pub struct SwarmReport {
     pub commands: u64,
     /// Crashes.
     pub crashes: u64,
+    /// What was drawn for the first links.
+    pub options: Vec<String>,
     /// What did not hold: each with its seed and the options drawn.
     pub violations: Vec<String>,
 }
@@ -113,10 +115,22 @@ pub fn swarm(hours: f64, seed: u64) -> SwarmReport {
     report
 }
 
+/// Of how many links the options are told.
+const OPTIONS_TOLD: usize = 8;
+
 /// One link from its seed: this is how a failure is replayed.
+pub fn swarm_one(seed: u64) -> SwarmReport {
+    let mut report = SwarmReport::default();
+    one(seed, &mut report);
+    report
+}
+
 fn one(seed: u64, report: &mut SwarmReport) {
     let mut random = fastrand::Rng::with_seed(seed);
     let options = Options::draw(&mut random);
+    if report.options.len() < OPTIONS_TOLD {
+        report.options.push(format!("seed {seed}: {options:?}"));
+    }
     let mut world = LinkWorld::new(seed ^ 0x7761_726d);
     world.write_time = options.write_time;
     world.trace = true;

@@ -232,7 +232,7 @@ impl LinkWorld {
     }
 
     fn offer_as(&mut self, port: Port, ticket: Ticket, envelope: Envelope, class: Class) {
-        let offer = Offer { ticket, envelope, class, interval: Duration::ZERO };
+        let offer = Offer::new(ticket, envelope, class);
         self.give(port, vec![Event::Offer(offer)]);
     }
 

@@ -36,6 +36,8 @@ fn node(entity: EntityId, services: Vec<ServiceSpec>) -> NodeConfig {
         export: vec![Prefix::all()],
         services: all,
         bridges: Vec::new(),
+        links: Vec::new(),
+        journaled: false,
     }
 }
 

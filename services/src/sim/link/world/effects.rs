@@ -5,7 +5,6 @@ use crate::link::{BatchId, CarrierId, Delivery, Effect, Event, Offer, Record, Ti
 use crate::sim::link::MachineId;
 use aldis_envelope::Monotonic;
 use bytes::Bytes;
-use std::time::Duration;
 
 /// What the links of a machine ask to be written in one turn: which link, its batch, its records.
 type Writes = Vec<(usize, BatchId, Vec<Record>)>;
@@ -82,7 +81,7 @@ impl LinkWorld {
         if let Some(slot) = on {
             self.tickets += 1;
             let (ticket, envelope) = (Ticket(self.tickets), delivery.envelope.clone());
-            let offer = Offer { ticket, envelope, class: delivery.class, interval: Duration::ZERO };
+            let offer = Offer::new(ticket, envelope, delivery.class);
             self.handle(Port(port.0, slot), vec![Event::Offer(offer)], writes);
         } else if id.is_some() {
             let content = delivery.envelope.message.content.to_vec();

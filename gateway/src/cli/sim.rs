@@ -1,0 +1,31 @@
+//! `aldis sim`: the simulator, in virtual time.
+
+mod crash;
+mod link;
+
+use super::exit::Failure;
+use clap::Subcommand;
+
+/// Simulate in virtual time; a failure is replayed from its seed.
+#[derive(clap::Args)]
+pub(crate) struct Sim {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand)]
+enum What {
+    /// Lossy links drawn from seeds, with crashes, outages and wrong clocks.
+    Link(link::SimLink),
+    /// Both ends of a link are killed at moments of chance, with torn writes.
+    Crash(crash::SimCrash),
+}
+
+impl Sim {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        match self.what {
+            What::Link(args) => args.run(),
+            What::Crash(args) => args.run(),
+        }
+    }
+}
