@@ -155,7 +155,8 @@ fn read_xml(input: &[u8], watch: &mut Watch<'_>) -> Outcome {
     }
 }
 
-/// What is written may be shorter than what was read, and so be allowed less memory: that is no misreading. Text forms keep all but the bits of a NaN.
+/// Text forms keep all but the bits of a NaN. (What is written may be shorter than what was read, and so be allowed less
+/// memory: a refusal for that is no misreading.)
 fn comes_back(object: &dyn lmcp::Object, again: Option<Box<dyn lmcp::Object>>) -> Outcome {
     let same = again.is_some_and(|again| format!("{again:?}") == format!("{object:?}"));
     if same { Outcome::Accepted } else { Outcome::Misread }
