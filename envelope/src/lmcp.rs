@@ -8,7 +8,7 @@
 //!   A type or version that is not declared here is told ([`DecodeError::is_unknown_type`]), so that
 //!   its message is carried as it is.
 //! - **Without decoding**: [`Header::peek`], [`natural_key`], [`position`].
-//! - **Text**: [`to_json`] and [`from_json`], strict; [`to_xml`] and [`read_xml`], which is as
+//! - **Text**: [`to_json`], and [`from_json`] and [`read_json`], which are strict; [`to_xml`] and [`read_xml`], which is as
 //!   tolerant as users' scenario files need.
 //! - **By name**: [`type_of`], [`descendants`]; the fields of any [`Object`] by [`Object::view`] and
 //!   [`Object::slot`].
@@ -44,6 +44,7 @@ mod error;
 mod json;
 mod key;
 mod list;
+mod memory;
 mod object;
 mod peek;
 mod reader;
@@ -68,7 +69,7 @@ mod tests;
 
 pub use container::{CONTAINER, MAGIC, checksum, decode, decode_as, encode, encode_into, split};
 pub use error::{DecodeError, DecodeFault, EncodeError, EncodeFault, FieldPath};
-pub use json::{JsonError, JsonFault, from_json, to_json};
+pub use json::{JsonError, JsonFault, from_json, read_json, to_json};
 pub use key::{KEYED, Keyed, key_of, natural_key};
 pub use list::LargeArray;
 pub use object::{Object, Struct};

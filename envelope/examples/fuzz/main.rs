@@ -8,8 +8,8 @@
 //!
 //! Prints one JSON object a decoder, and fails where one panicked or misread. `peak_per_byte` is the most memory that
 //! an input took at a time, in bytes for each of its own, among inputs of at least 512 bytes; `peak_short` is the most
-//! that a shorter one took, in bytes; `over` counts inputs that took more than the larger of four times their length
-//! and 2 KiB.
+//! that a shorter one took, in bytes. What a decoder works with and what it returns are counted together. `over`
+//! counts inputs that took more than the larger of four times their length and 2 KiB.
 
 mod corpus;
 mod decoders;

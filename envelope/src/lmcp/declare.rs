@@ -134,6 +134,7 @@ macro_rules! lmcp_types {
                         },
                     )*],
                     header: $series.header($id),
+                    size: size_of::<$name>(),
                     default: || Box::new(Self::default()),
                 };
             }
@@ -166,7 +167,11 @@ macro_rules! lmcp_types {
                     reader: &mut $crate::lmcp::Reader<'_>,
                 ) -> $crate::lmcp::Decoded<()> {
                     $(<$parent as $crate::lmcp::Object>::decode_fields(&mut self.base, reader)?;)?
-                    $(reader.field($wire, &mut self.$field)?;)*
+                    $(
+                        const { $crate::lmcp::schema::Run::at(<$name as $crate::lmcp::Struct>::TYPE, $wire) }
+                            .check(reader)?;
+                        reader.field($wire, &mut self.$field)?;
+                    )*
                     Ok(())
                 }
                 fn encode_fields(
@@ -176,6 +181,10 @@ macro_rules! lmcp_types {
                     $(<$parent as $crate::lmcp::Object>::encode_fields(&self.base, writer)?;)?
                     $(writer.field($wire, &self.$field)?;)*
                     Ok(())
+                }
+                fn apart(&self) -> usize {
+                    0 $(+ <$parent as $crate::lmcp::Object>::apart(&self.base))?
+                        $(+ $crate::lmcp::Value::apart(&self.$field))*
                 }
                 fn clone_box(&self) -> Box<dyn $crate::lmcp::Object> {
                     Box::new(self.clone())

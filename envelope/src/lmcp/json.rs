@@ -11,11 +11,14 @@
 //!
 //! Numbers are numbers, those of enumerations too. What JSON has no number for is text: `NaN`, `inf`
 //! and `-inf`; a NaN's other bits are lost. Null is null.
+//!
+//! Text is read straight into the objects, within the memory that a binary message of its length is allowed.
 
+mod cursor;
 mod read;
 mod write;
 
-pub use read::{JsonError, JsonFault, from_json};
+pub use read::{JsonError, JsonFault, from_json, read_json};
 pub use write::to_json;
 
 /// The members of an object's map.
@@ -26,4 +29,6 @@ mod member {
     pub(super) const TYPE_ID: &str = "_lmcp_type";
     pub(super) const VERSION: &str = "_version";
     pub(super) const FIELDS: &str = "fields";
+    /// The object itself, in the map of what describes it.
+    pub(super) const DESCRIBED: &str = "object";
 }

@@ -43,6 +43,9 @@ impl<T: Value> Value for Vec<T> {
     fn slot(&mut self) -> Slot<'_> {
         Slot::List(self)
     }
+    fn apart(&self) -> usize {
+        self.capacity() * size_of::<T>() + self.iter().map(T::apart).sum::<usize>()
+    }
 }
 
 impl<T: Value> Value for LargeArray<T> {
@@ -64,6 +67,9 @@ impl<T: Value> Value for LargeArray<T> {
     fn slot(&mut self) -> Slot<'_> {
         Slot::List(&mut self.0)
     }
+    fn apart(&self) -> usize {
+        self.0.apart()
+    }
 }
 
 impl<T: Value, const N: usize> Value for [T; N] {
@@ -83,6 +89,9 @@ impl<T: Value, const N: usize> Value for [T; N] {
     fn slot(&mut self) -> Slot<'_> {
         Slot::List(self)
     }
+    fn apart(&self) -> usize {
+        self.iter().map(T::apart).sum()
+    }
 }
 
 impl<T: Value> List for Vec<T> {
@@ -101,6 +110,15 @@ impl<T: Value> List for Vec<T> {
         }
         self.get_mut(index).map(T::slot)
     }
+    fn element_size(&self) -> usize {
+        size_of::<T>()
+    }
+    fn room(&self) -> usize {
+        self.capacity()
+    }
+    fn reserve(&mut self, more: usize) {
+        self.reserve_exact(more);
+    }
 }
 
 impl<T: Value, const N: usize> List for [T; N] {
@@ -116,6 +134,13 @@ impl<T: Value, const N: usize> List for [T; N] {
     fn place(&mut self, index: usize) -> Option<Slot<'_>> {
         self.get_mut(index).map(T::slot)
     }
+    fn element_size(&self) -> usize {
+        0
+    }
+    fn room(&self) -> usize {
+        N
+    }
+    fn reserve(&mut self, _: usize) {}
 }
 
 /// Reads `count` elements, if so many can be in the bytes that are left. Room is made for as many as

@@ -32,6 +32,8 @@ pub trait Object: Any + fmt::Debug + Send + Sync {
     /// # Errors
     /// Names the field that the wire cannot carry.
     fn encode_fields(&self, writer: &mut Writer<'_>) -> Encoded;
+    /// Bytes of memory that it takes beside itself: what its fields hold in boxes, lists and long texts.
+    fn apart(&self) -> usize;
     /// A copy in a box.
     fn clone_box(&self) -> Box<dyn Object>;
 }

@@ -53,7 +53,7 @@ pub fn position(message: &[u8]) -> Option<Position> {
 /// The 64-bit number `offset` bytes after the start of the root object's fields.
 pub(super) fn int64(fields: &mut Reader<'_>, offset: usize) -> Option<i64> {
     fields.bytes(offset).ok()?;
-    fields.array().ok().map(i64::from_be_bytes)
+    fields.array().ok().copied().map(i64::from_be_bytes)
 }
 
 /// Where the own field `name` of a type begins; does not compile unless the schema fixes it.

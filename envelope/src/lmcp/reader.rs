@@ -1,8 +1,8 @@
 //! Reads wire values from bytes, within bounds of length, depth and memory.
 
 use super::error::{DecodeError, DecodeFault, PATH_STEP};
-use super::schema::SeriesName;
-use super::value::Value;
+use super::schema::{Count, FieldInfo, Kind, SeriesName};
+use super::value::{Text, Value};
 
 /// Result of reading one value. The error is boxed so that success stays small.
 pub type Decoded<T> = Result<T, Box<DecodeError>>;
@@ -71,11 +71,11 @@ impl<'a> Reader<'a> {
 
     /// The next `N` bytes.
     #[inline(always)]
-    pub(super) fn array<const N: usize>(&mut self) -> Decoded<[u8; N]> {
+    pub(super) fn array<const N: usize>(&mut self) -> Decoded<&'a [u8; N]> {
         match self.rest.split_first_chunk() {
             Some((bytes, rest)) => {
                 self.rest = rest;
-                Ok(*bytes)
+                Ok(bytes)
             }
             None => self.fail(DecodeFault::Truncated { needed: N, left: self.left() }),
         }
@@ -93,14 +93,26 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// A text of at most 16 bytes, where so many follow: most keys, labels and names. What follows the text is blanked
+    /// out, so that words are checked and not bytes. None where that is not to be had, or the bytes are not UTF-8.
+    #[inline]
+    pub(super) fn short_text(&mut self, length: usize) -> Option<Text> {
+        let shift = 128_u32.checked_sub(8 * u32::try_from(length).ok()?)?;
+        let following = u128::from_le_bytes(*self.rest.first_chunk()?);
+        let padded = following.unbounded_shl(shift).unbounded_shr(shift).to_le_bytes();
+        let text = str::from_utf8(&padded).ok()?.get(..length)?;
+        self.rest = self.rest.get(length..)?;
+        Some(Text::new(text))
+    }
+
     #[inline]
     pub(super) fn u16(&mut self) -> Decoded<u16> {
-        self.array().map(u16::from_be_bytes)
+        Ok(u16::from_be_bytes(*self.array()?))
     }
 
     #[inline]
     pub(super) fn u32(&mut self) -> Decoded<u32> {
-        self.array().map(u32::from_be_bytes)
+        Ok(u32::from_be_bytes(*self.array()?))
     }
 
     /// A byte that is 0 or 1; `fault` says what any other one is.
@@ -109,8 +121,34 @@ impl<'a> Reader<'a> {
         match self.array()? {
             [0] => Ok(false),
             [1] => Ok(true),
-            [other] => self.fail_back(1, fault(other)),
+            &[other] => self.fail_back(1, fault(other)),
         }
+    }
+
+    /// Checks at once that the fields of fixed width that begin with this one are there; `width` is what they take.
+    #[inline(always)]
+    pub fn run(&mut self, width: usize, fields: &'static [FieldInfo], first: usize) -> Decoded<()> {
+        if self.rest.len() < width { Err(self.fail_run(width, &fields[first..])) } else { Ok(()) }
+    }
+
+    /// The error of the first of the fields for which the bytes that are left do not suffice.
+    #[cold]
+    #[inline(never)]
+    fn fail_run(&mut self, needed: usize, fields: &'static [FieldInfo]) -> Box<DecodeError> {
+        for field in fields {
+            let (count, width) = match field.kind {
+                Kind::List(element, Count::Fixed(count)) => (Some(count), element.width()),
+                kind => (None, kind.width()),
+            };
+            for index in 0..count.unwrap_or(1) {
+                if let Err(error) = self.bytes(width.unwrap_or(0)) {
+                    let error = if count.is_some() { error.in_element(index) } else { error };
+                    return error.in_field(field.name);
+                }
+            }
+        }
+        let fault = DecodeFault::Truncated { needed, left: self.left() };
+        Box::new(DecodeError::new(fault, self.end - self.rest.len()))
     }
 
     /// A field of an object; an error names it.
@@ -181,8 +219,12 @@ impl<'a> Reader<'a> {
         if !self.flag(DecodeFault::Presence)? {
             return Ok(None);
         }
-        let series = SeriesName(u64::from_be_bytes(self.array()?));
-        Ok(Some(Header { series, type_id: self.u32()?, version: self.u16()? }))
+        let [s0, s1, s2, s3, s4, s5, s6, s7, t0, t1, t2, t3, v0, v1] = *self.array()?;
+        Ok(Some(Header {
+            series: SeriesName(u64::from_be_bytes([s0, s1, s2, s3, s4, s5, s6, s7])),
+            type_id: u32::from_be_bytes([t0, t1, t2, t3]),
+            version: u16::from_be_bytes([v0, v1]),
+        }))
     }
 }
 

@@ -173,6 +173,9 @@ impl<T: Struct> Value for Ref<T> {
     fn slot(&mut self) -> Slot<'_> {
         Slot::Object(self)
     }
+    fn apart(&self) -> usize {
+        self.object().map_or(0, |object| self.size_apart(object.type_info()) + object.apart())
+    }
 }
 
 impl<T: Struct> Reference for Ref<T> {
@@ -188,6 +191,24 @@ impl<T: Struct> Reference for Ref<T> {
             Err(descendant) => Content::Descendant(descendant),
         };
         Ok(())
+    }
+    fn make(&mut self, info: &'static TypeInfo) -> Option<&mut dyn Object> {
+        if !info.is_a(T::TYPE) {
+            return None;
+        }
+        self.0 = if info == T::TYPE {
+            Content::Exact(T::Place::default())
+        } else {
+            Content::Descendant((info.default)())
+        };
+        match &mut self.0 {
+            Content::Null => None,
+            Content::Exact(place) => Some(place.get_mut()),
+            Content::Descendant(object) => Some(object.as_mut()),
+        }
+    }
+    fn size_apart(&self, info: &TypeInfo) -> usize {
+        if info == T::TYPE { T::Place::APART } else { info.size }
     }
 }
 

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::object::Object;
-use super::reader::HEADER;
+use super::reader::{Decoded, HEADER, Reader};
 
 /// The name of a series as the wire carries it: up to eight ASCII characters, zero padded, as one
 /// big-endian number.
@@ -82,6 +82,8 @@ pub struct TypeInfo {
     pub own_fields: &'static [FieldInfo],
     /// What an object of this type begins with on the wire.
     pub(super) header: [u8; HEADER],
+    /// Bytes that an object of this type takes in memory, without what it holds elsewhere.
+    pub size: usize,
     /// Makes an object of this type, every field at its default.
     pub default: fn() -> Box<dyn Object>,
 }
@@ -147,6 +149,40 @@ impl TypeInfo {
             i += 1;
         }
         size
+    }
+}
+
+/// Fields of fixed width that follow one another, from a field on that begins such a row.
+pub(super) struct Run {
+    fields: &'static [FieldInfo],
+    first: usize,
+    width: usize,
+}
+
+impl Run {
+    /// The run that the own field `name` begins; of width 0 where it begins none.
+    pub(super) const fn at(info: &TypeInfo, name: &str) -> Self {
+        let fields = info.own_fields;
+        let mut first = 0;
+        while !same_text(fields[first].name, name) {
+            first += 1;
+        }
+        let (mut width, mut i) = (0, first);
+        if first == 0 || fields[first - 1].kind.width().is_none() {
+            while i < fields.len()
+                && let Some(field) = fields[i].kind.width()
+            {
+                width += field;
+                i += 1;
+            }
+        }
+        Self { fields, first, width }
+    }
+
+    /// Checks at once that all of it is there, so that its fields are read without a check of each.
+    #[inline(always)]
+    pub(super) fn check(&self, reader: &mut Reader<'_>) -> Decoded<()> {
+        reader.run(self.width, self.fields, self.first)
     }
 }
 

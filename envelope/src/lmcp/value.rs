@@ -3,7 +3,7 @@
 use super::error::DecodeFault;
 use super::object::Object;
 use super::reader::{Decoded, Reader};
-use super::schema::{EnumInfo, Kind};
+use super::schema::{EnumInfo, Kind, TypeInfo};
 use super::writer::{Encoded, Writer};
 
 /// A text of an object. Up to 24 bytes stand in line, without a box: most keys, labels and names do.
@@ -14,6 +14,11 @@ const TEXT_INLINE: usize = size_of::<Text>();
 
 /// What a longer text takes at least.
 const TEXT_APART_MIN: usize = TEXT_INLINE + size_of::<usize>();
+
+/// Bytes that a text of that length takes beside itself.
+pub(super) fn text_apart(length: usize) -> usize {
+    if length > TEXT_INLINE { length.max(TEXT_APART_MIN) } else { 0 }
+}
 
 /// A value that a field may hold. Floating-point numbers keep their bits, enumerations any number.
 pub trait Value: Sized {
@@ -29,6 +34,10 @@ pub trait Value: Sized {
     fn view(&self) -> View<'_>;
     /// Gives it to be set.
     fn slot(&mut self) -> Slot<'_>;
+    /// Bytes of memory that it takes beside itself.
+    fn apart(&self) -> usize {
+        0
+    }
 }
 
 /// A value seen without knowing its type.
@@ -95,6 +104,12 @@ pub trait List {
     /// The place of the element at `index`; the one after the last is appended. None beyond that,
     /// and beyond the length of a fixed array.
     fn place(&mut self, index: usize) -> Option<Slot<'_>>;
+    /// Bytes that room for one more element takes: none in a fixed array.
+    fn element_size(&self) -> usize;
+    /// Elements for which there is room.
+    fn room(&self) -> usize;
+    /// Makes room for `more` elements and not for more.
+    fn reserve(&mut self, more: usize);
 }
 
 /// A field for an object, without knowing its declared type beforehand.
@@ -106,6 +121,11 @@ pub trait Reference {
     /// # Errors
     /// Gives the object back when the field does not hold its type.
     fn put(&mut self, object: Box<dyn Object>) -> Result<(), Box<dyn Object>>;
+    /// Makes it an object of that type, every field at its default; none, and nothing is changed, when the field does
+    /// not hold the type.
+    fn make(&mut self, info: &'static TypeInfo) -> Option<&mut dyn Object>;
+    /// Bytes that an object of that type takes beside the field.
+    fn size_apart(&self, info: &TypeInfo) -> usize;
 }
 
 macro_rules! number {
@@ -117,7 +137,7 @@ macro_rules! number {
             }
             #[inline(always)]
             fn decode(&mut self, reader: &mut Reader<'_>) -> Decoded<()> {
-                *self = Self::from_be_bytes(reader.array()?);
+                *self = Self::from_be_bytes(*reader.array()?);
                 Ok(())
             }
             #[inline(always)]
@@ -173,10 +193,14 @@ impl Value for Text {
     #[inline]
     fn decode(&mut self, reader: &mut Reader<'_>) -> Decoded<()> {
         let length = reader.u16()?.into();
+        if let Some(text) = reader.short_text(length) {
+            *self = text;
+            return Ok(());
+        }
         let bytes = reader.bytes(length)?;
         let Ok(text) = str::from_utf8(bytes) else { return reader.fail_back(length, DecodeFault::Text) };
         if length > TEXT_INLINE {
-            reader.allocate(length.max(TEXT_APART_MIN))?;
+            reader.allocate(text_apart(length))?;
         }
         *self = Text::new(text);
         Ok(())
@@ -190,6 +214,9 @@ impl Value for Text {
     }
     fn slot(&mut self) -> Slot<'_> {
         Slot::Text(self)
+    }
+    fn apart(&self) -> usize {
+        text_apart(self.len())
     }
 }
 

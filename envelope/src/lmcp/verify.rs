@@ -42,8 +42,10 @@ pub struct XmlVerification {
     pub timed: usize,
     /// Objects that did not come back as they were: the line where each begins, and its type.
     pub unstable: Vec<(usize, &'static TypeInfo)>,
-    /// What was passed over.
+    /// What was passed over, as far as there was memory for it.
     pub warnings: Vec<Warning>,
+    /// How much more was passed over.
+    pub more_warnings: usize,
 }
 
 /// Reads a document, and sends each of its objects through the forms: LMCP, object, XML, object, LMCP.
@@ -58,6 +60,7 @@ pub fn verify_xml(document: &[u8]) -> Result<XmlVerification, XmlError> {
         timed: read.objects.iter().filter(|placed| placed.time.is_some()).count(),
         unstable: unstable.map(|placed| (placed.line, placed.object.type_info())).collect(),
         warnings: read.warnings,
+        more_warnings: read.more_warnings,
     })
 }
 

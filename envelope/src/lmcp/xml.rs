@@ -15,15 +15,16 @@
 //! `null`, left out where null is the field's default. Blanks around a text are no part of it unless
 //! written as character references, and are written so. A NaN's other bits are lost.
 //!
-//! While a document is read, it takes up to some thirty times its length in memory: it is meant for the files of
-//! users, whose length the caller bounds, not for bytes from a network.
+//! A document is read straight into its objects, within the memory that a binary message of its length is allowed.
 
+mod pull;
 mod read;
-mod tree;
+
 mod write;
 
+pub use pull::{XmlError, XmlFault};
 pub use read::{Document, Placed, Warning, WarningKind, read_xml};
-pub use tree::{XmlError, XmlFault};
+
 pub use write::{XmlTextError, to_xml};
 
 /// The attribute that tells an object's series.

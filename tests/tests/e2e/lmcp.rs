@@ -103,7 +103,7 @@ fn what_cannot_be_encoded_is_said_with_its_place() {
         r#"{"_type":"afrl.cmasi.Task","fields":{}} {"_type":"afrl.cmasi.Task","fields":{"TaskID":"x"}}"#;
     for (name, text, why) in [
         ("field.json", wrong, "object 2: a 64-bit integer expected in TaskID"),
-        ("syntax.json", "{", "object 1: EOF"),
+        ("syntax.json", "{", "object 1: line 1: a key expected"),
         ("open.xml", "<a>\n<b>", "open.xml: line 2: the document ends within the element b"),
         ("none.xml", "<a/>", "no LMCP object"),
     ] {

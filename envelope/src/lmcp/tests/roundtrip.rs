@@ -82,7 +82,7 @@ proptest! {
         prop_assert_eq!(&*decode(&message).unwrap(), &*object);
 
         let json = to_json(object.as_ref()).to_string();
-        let from_json = from_json(&serde_json::from_str(&json).unwrap()).unwrap();
+        let from_json = from_json(json.as_bytes()).unwrap();
         prop_assert_eq!(encode(from_json.as_ref()).unwrap(), message.clone());
 
         let from_xml = read_xml(to_xml(object.as_ref()).unwrap().as_bytes()).unwrap();

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::{files, golden_messages, read, shared};
 use crate::lmcp::cmasi::{AirVehicleState, AltitudeType, AutomationRequest, KeyValuePair, Location3D};
 use crate::lmcp::impact::CommRelayTask;
-use crate::lmcp::{Object, Ref, Text, WarningKind, XmlFault, decode, encode, read_xml, to_xml};
+use crate::lmcp::{Object, Ref, Text, WarningKind, XmlFault, decode, encode, read_xml, to_xml, types};
 
 /// The one object of a document without anything to warn of.
 fn read_one(xml: &str) -> Box<dyn Object> {
@@ -178,4 +178,30 @@ fn numbers_come_back_to_the_last_bit() {
         altitude_type: AltitudeType(-7),
     };
     assert_eq!(read_one(&to_xml(&place).unwrap()).get(), Some(&place));
+}
+
+#[test]
+fn an_object_of_each_type_with_nothing_said_of_it_is_read() {
+    for info in types() {
+        let xml = format!("<{} Series=\"{}\"/>", info.name, info.series.text);
+        assert_eq!(read_one(&xml).type_info(), info);
+    }
+}
+
+#[test]
+fn nulls_do_not_multiply_memory() {
+    let nulls = |count: usize| {
+        let list = "<null/>".repeat(count);
+        read_xml(format!("<Task Series='CMASI'><Parameters>{list}</Parameters></Task>").as_bytes())
+    };
+    assert!(nulls(4).is_ok());
+    assert_eq!(nulls(10_000).unwrap_err().fault, XmlFault::Memory);
+}
+
+#[test]
+fn what_is_passed_over_is_counted_where_there_is_no_room_to_note_it() {
+    let xml = format!("<Task Series='CMASI'>{}</Task>", "<a/>".repeat(1000));
+    let document = read_xml(xml.as_bytes()).unwrap();
+    assert!(!document.warnings.is_empty() && document.more_warnings > 0);
+    assert_eq!(document.warnings.len() + document.more_warnings, 1000);
 }

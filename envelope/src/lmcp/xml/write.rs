@@ -4,7 +4,7 @@ use std::fmt::{self, Write};
 
 use thiserror::Error;
 
-use super::tree::BLANK;
+use super::pull::BLANK;
 use super::{NULL, SERIES};
 use crate::lmcp::error::{FieldPath, Within};
 use crate::lmcp::object::{Object, elements};

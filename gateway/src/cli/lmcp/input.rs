@@ -1,8 +1,7 @@
 //! Files, standard input, and the objects in them.
 
 use super::super::exit::Failure;
-use aldis_envelope::lmcp::{Object, Placed, from_json, read_xml};
-use serde_json::Value;
+use aldis_envelope::lmcp::{Object, Placed, read_json, read_xml};
 use std::io::Read;
 use std::path::Path;
 
@@ -27,6 +26,9 @@ pub(in super::super) fn objects_of_xml(path: &Path, bytes: &[u8]) -> Result<Vec<
     for warning in &document.warnings {
         eprintln!("aldis: {name}: {warning}; passed over");
     }
+    if document.more_warnings > 0 {
+        eprintln!("aldis: {name}: {} more passed over", document.more_warnings);
+    }
     if document.objects.is_empty() {
         let why = "no LMCP object: no element has the attribute Series and a known type";
         return Err(Failure::Failed(format!("{name}: {why}")));
@@ -37,18 +39,8 @@ pub(in super::super) fn objects_of_xml(path: &Path, bytes: &[u8]) -> Result<Vec<
 /// The objects of a JSON file: one, several in a row, or an array of them; each may stand by itself or as the member
 /// `object`, as `aldis lmcp decode` prints those of a stream.
 pub(in super::super) fn objects_of_json(path: &Path, bytes: &[u8]) -> Result<Vec<Box<dyn Object>>, Failure> {
-    let failed = |place: usize, why: &dyn std::fmt::Display| {
-        Failure::Failed(format!("{}: object {place}: {why}", path.display()))
-    };
-    let mut objects = Vec::new();
-    for value in serde_json::Deserializer::from_slice(bytes).into_iter::<Value>() {
-        let value = value.map_err(|why| failed(objects.len() + 1, &why))?;
-        let several = if let Value::Array(several) = value { several } else { vec![value] };
-        for value in several {
-            let object = from_json(value.get("object").unwrap_or(&value));
-            objects.push(object.map_err(|why| failed(objects.len() + 1, &why))?);
-        }
-    }
+    let objects = read_json(bytes)
+        .map_err(|(place, why)| Failure::Failed(format!("{}: object {place}: {why}", path.display())))?;
     if objects.is_empty() {
         return Err(Failure::Failed(format!("{}: no JSON value", path.display())));
     }

@@ -144,7 +144,7 @@ impl Found {
                 self.objects += verified.objects;
                 self.timed += verified.timed;
                 self.stable += verified.objects - verified.unstable.len();
-                self.warnings += verified.warnings.len();
+                self.warnings += verified.warnings.len() + verified.more_warnings;
                 for (line, info) in verified.unstable {
                     self.fail(file, Some(line), format_args!("{info} does not come back the same"));
                 }
