@@ -187,6 +187,33 @@ fn vehicles_that_turn_wide_are_led_clear_of_zones() {
 }
 
 #[test]
+fn areas_between_slanted_zones_are_found() {
+    let mut random = fastrand::Rng::with_seed(3);
+    for _ in 0..40 {
+        let mut place = || (random.f64() * 900.0, random.f64() * 900.0);
+        let area = Boundary::Polygon(vec![place(), place(), place()]);
+        let zones = [Zone::new(1, ZoneKind::KeepIn, Boundary::Polygon(vec![place(), place(), place()]))];
+        let Ok(space) = FreeSpace::new(&zones, &anybody()) else { continue };
+        let corners = |boundary: &Boundary| match boundary {
+            Boundary::Polygon(corners) => corners.clone(),
+            _ => Vec::new(),
+        };
+        let (a, b) = (corners(&area), corners(&zones[0].boundary));
+        let middle = |corners: &[Point]| {
+            let sum = corners.iter().fold((0.0, 0.0), |sum, at| (sum.0 + at.0, sum.1 + at.1));
+            (sum.0 / 3.0, sum.1 / 3.0)
+        };
+        let found = search(20.0).plan(&area, Mover::OnTheSpot(&space), None);
+        // The middle of one triangle well within the other: they share an area.
+        if depth(&area, middle(&b)) > 30.0 || depth(&zones[0].boundary, middle(&a)) > 30.0 {
+            assert!(found.unwrap().coverage.share() > 0.9);
+        } else if let Err(error) = found {
+            assert!(matches!(error, SearchError::NothingFree | SearchError::NothingSwept), "{error}");
+        }
+    }
+}
+
+#[test]
 fn what_is_cut_off_or_wrong_is_told() {
     let area = box_of((0., 0.), (1000., 500.));
     let region = Zone::new(1, ZoneKind::KeepIn, box_of((-100., -100.), (1200., 700.)));
