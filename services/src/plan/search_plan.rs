@@ -175,6 +175,29 @@ pub enum SearchError {
     Start(#[from] TurningError),
 }
 
+/// At which shares of a part's height a place inside is looked for.
+const HEIGHTS: [f64; 5] = [0.503, 0.257, 0.751, 0.061, 0.941];
+
+/// A place inside a part, in the middle of where a line across meets it. The part's corners will not do: where outlines cross,
+/// they are rounded to the grid, and may be a hair outside.
+fn inner(part: &[Ring], space: &FreeSpace) -> Option<(f64, f64)> {
+    let rings: Vec<Vec<_>> =
+        part.iter().map(|ring| ring.iter().map(|&cell| grid::place(cell)).collect()).collect();
+    let heights = || rings.iter().flatten().map(|at: &(f64, f64)| at.1);
+    let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
+    HEIGHTS.into_iter().find_map(|share| {
+        let height = low + (high - low) * share;
+        let sides = rings.iter().flat_map(|ring| ring.iter().zip(ring.iter().cycle().skip(1)));
+        let mut crossings: Vec<f64> = sides
+            .filter(|(a, b)| (a.1 <= height) != (b.1 <= height))
+            .map(|(a, b)| a.0 + (b.0 - a.0) * (height - a.1) / (b.1 - a.1))
+            .collect();
+        crossings.sort_by(f64::total_cmp);
+        let middles = crossings.chunks_exact(2).map(|pair| (f64::midpoint(pair[0], pair[1]), height));
+        middles.into_iter().find(|place| space.contains(*place))
+    })
+}
+
 /// An area on the grid: all of it, and its parts in free space that can be reached.
 pub(super) struct Target {
     asked_m2: f64,
@@ -194,17 +217,16 @@ impl Target {
         })?;
         let mut parts = grid::intersection_parts(&asked, space.rings());
         parts.sort_by(|a, b| grid::area_m2(b).total_cmp(&grid::area_m2(a)));
-        let corner = |part: &[Ring]| grid::place(part[0][0]);
         let from = match start {
             Some(start) => start.at,
-            None => corner(parts.first().ok_or(SearchError::NothingFree)?),
+            None => parts.iter().find_map(|part| inner(part, space)).ok_or(SearchError::NothingFree)?,
         };
         if start.is_some() {
             // The start's own faults are told as such.
             space.route(from, from).map_err(TurningError::Route)?;
         }
-        let (reached, cut_off): (Vec<_>, Vec<_>) =
-            parts.into_iter().partition(|part| space.route(from, corner(part)).is_ok());
+        let is_reached = |part: &[Ring]| inner(part, space).is_some_and(|to| space.route(from, to).is_ok());
+        let (reached, cut_off): (Vec<_>, Vec<_>) = parts.into_iter().partition(|part| is_reached(part));
         if reached.is_empty() {
             return Err(SearchError::NothingFree);
         }

@@ -1,5 +1,9 @@
 //! What a sensor sees of the ground.
 
+mod gimbal;
+
+pub use gimbal::{Aim, AimError, Gimbal};
+
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Where a sensor sees the ground, in metres from below it, along its look.
