@@ -18,6 +18,7 @@ mod observe;
 mod options;
 mod run;
 mod trace;
+pub mod umaa;
 mod world;
 
 pub use disk::{DiskFaults, SimDisk};

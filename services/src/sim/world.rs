@@ -11,6 +11,7 @@ use super::trace::Trace;
 use crate::event::{BridgeId, Effect, Event, PeerEvent, PeerId};
 use crate::node::{Node, NodeConfig};
 use aldis_envelope::{BootId, Keys, Label, Monotonic, Now};
+use bus::BusFaults;
 use bytes::Bytes;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -66,8 +67,8 @@ pub struct World {
     /// When the last sample on a way arrives: ways keep their order.
     last_arrival: BTreeMap<(usize, usize), Monotonic>,
     delay: (Duration, Duration),
-    /// The share of samples that the bus drops because somebody does not keep up.
-    sample_loss: f64,
+    /// The shares of samples that the bus drops, lets others overtake and delivers twice.
+    bus_faults: BusFaults,
     facts: Facts,
     checkers: Vec<Box<dyn Checker>>,
     violations: Vec<Violation>,
@@ -86,7 +87,7 @@ impl World {
             routes: BTreeMap::new(),
             last_arrival: BTreeMap::new(),
             delay,
-            sample_loss: 0.0,
+            bus_faults: BusFaults::default(),
             facts: Facts::default(),
             checkers: Vec::new(),
             violations: Vec::new(),
