@@ -21,6 +21,7 @@ mod replay;
 mod retained;
 mod route;
 mod run;
+mod sim;
 mod subscribe;
 mod telemetry;
 mod within;
@@ -94,6 +95,8 @@ enum Command {
     Assign(assign::Assign),
     /// Find a way around zones, with turns no tighter than the vehicle makes.
     Route(route::Route),
+    /// Run a fleet in the simulator, from seeds.
+    Sim(sim::SimArgs),
     /// Measure this machine, side by side with the limit.
     Bench(bench::Bench),
 }
@@ -123,6 +126,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Lmcp(args) => args.run(),
         Command::Assign(args) => args.run(),
         Command::Route(args) => args.run(),
+        Command::Sim(args) => args.run(),
         Command::Bench(args) => args.run(),
     };
     match done {
