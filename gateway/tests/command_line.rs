@@ -21,7 +21,7 @@ fn help_teaches_by_example_and_tells_the_exit_codes() {
     for part in ["aldis demo", "aldis run configs/shore.toml", "Exit codes", "3 nobody is there"] {
         assert!(help.contains(part), "{part}: {help}");
     }
-    for verb in ["run", "check", "acl", "pub", "sub", "call", "fleet", "demo", "lmcp", "bench"] {
+    for verb in ["run", "check", "acl", "pub", "sub", "call", "fleet", "demo", "lmcp", "bench", "conform"] {
         assert!(stdout(&aldis(&[verb, "--help"])).contains("Example"), "{verb}");
     }
 }
@@ -64,4 +64,22 @@ fn wrong_usage_starts_nothing() {
     let missing = aldis(&["run", "configs/none.toml"]);
     assert_eq!(missing.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&missing.stderr).contains("none.toml"));
+}
+
+#[test]
+fn a_simulated_fleet_is_recorded_and_judged() {
+    let file = concat!(env!("CARGO_TARGET_TMPDIR"), "/sim.aldis");
+    let _ = std::fs::remove_file(file);
+    let run = aldis(&["sim", "umaa", "--seed", "0", "--record", file, "--conform", "--json"]);
+    let run: serde_json::Value = serde_json::from_str(&stdout(&run)).unwrap();
+    assert_eq!((&run["violations"], &run["conform"]["clauses_broken"]), (&0.into(), &0.into()), "{run}");
+    assert_eq!((&run["illegal"], &run["illegal_rejected"]), (&396.into(), &396.into()));
+    let judged = aldis(&["conform", "--file", file, "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&stdout(&judged)).unwrap();
+    assert_eq!(report["clauses_broken"], 0, "{report}");
+    assert!(report["observations"].as_u64().unwrap() > 300, "{report}");
+    assert!(judged.status.success());
+    let unknown = aldis(&["sim", "umaa", "--plant", "nothing"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&unknown.stderr).contains("stale-guard"));
 }

@@ -18,12 +18,15 @@ mod sample;
 mod schema;
 #[cfg(test)]
 mod tests;
-mod transition;
+pub(crate) mod transition;
+mod watcher;
 
 pub use clause::Clause;
+pub use command::{Role, role_of};
 pub use ledger::Evidence;
 pub use observation::{Content, Decoder, Observation, Observed};
 pub use report::{ClauseReport, Report, Verdict};
+pub use watcher::Watcher;
 
 use allocation::Allocations;
 use collection::Collections;
@@ -47,12 +50,20 @@ pub struct Bounds {
     /// How much later than the truth an observation of one writer may come beside those of another. Zero in a simulation
     /// that is watched at its source.
     pub slack: Duration,
+    /// How long a participant may go by what it has not heard yet, because a link is silent or a machine stands still.
+    pub unheard: Duration,
 }
 
 impl Default for Bounds {
     fn default() -> Self {
         let second = Duration::from_secs(1);
-        Self { answer: 5 * second, clean_up: 10 * second, follow: 10 * second, slack: Duration::ZERO }
+        Self {
+            answer: 5 * second,
+            clean_up: 10 * second,
+            follow: 10 * second,
+            slack: Duration::ZERO,
+            unheard: Duration::ZERO,
+        }
     }
 }
 

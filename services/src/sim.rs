@@ -19,6 +19,7 @@ pub mod offline;
 mod options;
 mod run;
 mod trace;
+pub mod umaa;
 mod world;
 
 pub use disk::{DiskFaults, SimDisk};

@@ -6,6 +6,7 @@ use super::print_line;
 use super::subscribe::envelope_json;
 use super::within::Within;
 use aldis_envelope::{Change, ContentType, Envelope, Guid, Guids, Now, Prefix, umaa};
+use aldis_services::conform::{Role, role_of};
 use aldis_services::{Input, Outbox};
 use serde_json::Value;
 use std::sync::mpsc;
@@ -57,7 +58,7 @@ impl Desk for Watcher {
     fn take(&mut self, _: Now, input: Input<'_>, _: &mut Outbox) {
         let heard = match input {
             Input::Bus(true) => Heard::Joined,
-            Input::Message(envelope) if Part::of(envelope).is_some() => {
+            Input::Message(envelope) if role(envelope).is_some() => {
                 Heard::Envelope(Box::new(envelope.clone()))
             }
             _ => return,
@@ -67,28 +68,9 @@ impl Desk for Watcher {
     }
 }
 
-/// Which part of a command's flow a topic carries, by its name (ICD 4.1).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Part {
-    Command,
-    Acknowledgement,
-    Status,
-    Execution,
-}
-
-impl Part {
-    fn of(envelope: &Envelope) -> Option<Self> {
-        let name = envelope.message.label.descriptor();
-        let name = name.strip_suffix("Type").unwrap_or(name);
-        let parts = [
-            ("CommandAckReport", Self::Acknowledgement),
-            ("CommandStatus", Self::Status),
-            ("ExecutionStatusReport", Self::Execution),
-            ("Command", Self::Command),
-        ];
-        let is_umaa = name.starts_with("UMAA::");
-        parts.into_iter().find(|(end, _)| is_umaa && name.ends_with(end)).map(|(_, part)| part)
-    }
+/// Which part of a command's flow an envelope carries.
+fn role(envelope: &Envelope) -> Option<Role> {
+    role_of(envelope.message.label.descriptor())
 }
 
 impl CommandArgs {
@@ -142,11 +124,11 @@ impl Watch {
         let message = &envelope.message;
         let (time, writer) = (envelope.stamp.source_time, message.label.source());
         let topic = message.label.descriptor().rsplit("::").next().unwrap_or_default();
-        let what = match (message.change, Part::of(envelope)) {
-            (Change::Dispose, Some(Part::Command)) => "disposed: a cancel, or the end is known".to_owned(),
+        let what = match (message.change, role(envelope)) {
+            (Change::Dispose, Some(Role::Command)) => "disposed: a cancel, or the end is known".to_owned(),
             (Change::Dispose, _) => "disposed".to_owned(),
             (Change::Unregister, _) => "unregistered".to_owned(),
-            (Change::Put, part) => said(guids, part, envelope),
+            (Change::Put, role) => said(guids, role, envelope),
         };
         print_line(format_args!("{time} {writer} {topic} {} {what}", session(envelope)));
     }
@@ -171,23 +153,23 @@ fn session(envelope: &Envelope) -> String {
     )
 }
 
-fn said(guids: &Guids, part: Option<Part>, envelope: &Envelope) -> String {
+fn said(guids: &Guids, role: Option<Role>, envelope: &Envelope) -> String {
     let Some(sample) = sample(envelope) else {
         return format!("{} B", envelope.message.content.len());
     };
     let text = |member: &str| sample[member].as_str().unwrap_or_default();
-    match part {
-        Some(Part::Status) => {
+    match role {
+        Some(Role::Status) => {
             let (state, reason, log) =
                 (text("commandStatus"), text("commandStatusReason"), text("logMessage"));
             format!("{state} {reason} {log}").trim_end().to_owned()
         }
-        Some(Part::Command) => {
+        Some(Role::Command) => {
             let to = text("destination");
             let service = to.parse::<Guid>().ok().and_then(|guid| guids.service(guid));
             format!("to {}", service.map_or_else(|| to.to_owned(), |service| service.to_string()))
         }
-        Some(Part::Acknowledgement) => "acknowledged".to_owned(),
-        Some(Part::Execution) | None => sample.to_string(),
+        Some(Role::Ack) => "acknowledged".to_owned(),
+        Some(Role::ExecutionStatus) | None => sample.to_string(),
     }
 }

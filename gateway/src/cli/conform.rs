@@ -5,20 +5,12 @@ use super::member::{Desk, Join, Member};
 use super::print_line;
 use super::within::Within;
 use aldis_envelope::codec::recording::Reader;
-use aldis_envelope::{Envelope, KeyHash, Monotonic, Now, Prefix, Source};
-use aldis_services::conform::{Bounds, Decoder, Monitor, Observation, Observed, Report, Verdict};
+use aldis_envelope::{Monotonic, Now, Prefix};
+use aldis_services::conform::{Bounds, Decoder, Monitor, Report, Verdict, Watcher};
 use aldis_services::{Input, Outbox};
-use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::time::{Duration, Instant};
-
-/// How long after joining what comes is still taken for history. Topics are repaired each on its own, so that what one of them
-/// said before the monitor came may reach it after what another said later.
-const SETTLING: Duration = Duration::from_secs(1);
-
-/// How many instances are remembered with their writers, to tell when those have vanished.
-const INSTANCES_MAX: usize = 100_000;
 
 /// Watch UMAA traffic and report, clause by clause of the ICD, what was held and what was broken.
 ///
@@ -59,13 +51,9 @@ enum Format {
     Junit,
 }
 
-/// Hands what the bus says to the monitor.
+/// Hands what the bus says to the watcher.
 struct Watching {
-    monitor: Arc<Mutex<Option<Monitor>>>,
-    decoder: Decoder,
-    judges_from: Option<Monotonic>,
-    written: BTreeMap<Source, BTreeSet<(String, KeyHash)>>,
-    instances: usize,
+    watcher: Arc<Mutex<Option<Watcher>>>,
     tell: mpsc::Sender<Told>,
 }
 
@@ -75,60 +63,20 @@ enum Told {
     Stop,
 }
 
-impl Watching {
-    fn observe(&self, observation: &Observation) {
-        let mut monitor = self.monitor.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(monitor) = monitor.as_mut() {
-            monitor.observe(observation);
-        }
-    }
-
-    fn message(&mut self, now: Now, envelope: &Envelope) {
-        let Some(observation) = self.decoder.observation(now.monotonic, envelope) else { return };
-        let retained = self.judges_from.is_none_or(|from| now.monotonic < from);
-        let observation = Observation { retained, ..observation };
-        let of_writer = self.written.entry(observation.writer).or_default();
-        let id = (observation.topic.clone(), observation.instance);
-        match observation.observed {
-            Observed::Put(_) if self.instances < INSTANCES_MAX && of_writer.insert(id.clone()) => {
-                self.instances += 1
-            }
-            Observed::Dispose | Observed::Unregister if of_writer.remove(&id) => self.instances -= 1,
-            _ => {}
-        }
-        self.observe(&observation);
-    }
-
-    /// A writer has vanished: nobody speaks for what it wrote.
-    fn vanished(&mut self, now: Now, writer: Source) {
-        let written = self.written.remove(&writer).unwrap_or_default();
-        self.instances -= written.len();
-        for (topic, instance) in written {
-            let observed = Observed::NoWriters;
-            self.observe(&Observation {
-                at: now.monotonic,
-                writer,
-                topic,
-                type_name: None,
-                instance,
-                key: None,
-                retained: false,
-                observed,
-            });
-        }
-    }
-}
-
 impl Desk for Watching {
     fn take(&mut self, now: Now, input: Input<'_>, _: &mut Outbox) {
+        if matches!(input, Input::Bus(true)) {
+            // The command no longer listens where it has been cut off.
+            let _ = self.tell.send(Told::Joined);
+        }
+        let mut watcher = self.watcher.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(watcher) = watcher.as_mut() else { return };
         match input {
-            Input::Bus(true) => {
-                // The command no longer listens where it has been cut off.
-                let _ = self.tell.send(Told::Joined);
+            Input::HistoryComplete(_) => watcher.history_complete(now.monotonic),
+            Input::Message(envelope) if envelope.message.call.is_none() => {
+                watcher.message(now.monotonic, envelope);
             }
-            Input::HistoryComplete(_) => self.judges_from = Some(now.monotonic + SETTLING),
-            Input::Message(envelope) if envelope.message.call.is_none() => self.message(now, envelope),
-            Input::Token(writer, false) => self.vanished(now, writer),
+            Input::Token(writer, false) => watcher.vanished(now.monotonic, writer),
             _ => {}
         }
     }
@@ -154,15 +102,9 @@ impl Conform {
 
     fn watch(&self, monitor: Monitor) -> Result<Report, Failure> {
         let (tell, told) = mpsc::channel();
-        let shared = Arc::new(Mutex::new(Some(monitor)));
-        let desk = Watching {
-            monitor: shared.clone(),
-            decoder: Decoder::new([]),
-            judges_from: None,
-            written: BTreeMap::new(),
-            instances: 0,
-            tell: tell.clone(),
-        };
+        let watcher = Watcher::joining(monitor, Decoder::new([]));
+        let shared = Arc::new(Mutex::new(Some(watcher)));
+        let desk = Watching { watcher: shared.clone(), tell: tell.clone() };
         let prefixes = Prefix::new("UMAA::").into_iter().collect();
         let member = Member::join(&self.join, prefixes, desk)?;
         let joined = told.recv_timeout(super::JOIN_WITHIN);
@@ -177,18 +119,18 @@ impl Conform {
         }
         member.leave()?;
         joined.map_err(|_| self.join.unreachable())?;
-        let monitor = shared.lock().unwrap_or_else(PoisonError::into_inner).take();
-        let monitor = monitor.ok_or_else(|| Failure::Failed("the monitor is gone".into()))?;
-        Ok(monitor.finish(Monotonic::since_start(started.elapsed())))
+        let watcher = shared.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let watcher = watcher.ok_or_else(|| Failure::Failed("the monitor is gone".into()))?;
+        Ok(watcher.finish(Monotonic::since_start(started.elapsed())))
     }
 }
 
 /// What a recording shows. Its first envelopes may be history: the recording does not say which.
-fn replayed(file: &std::path::Path, mut monitor: Monitor) -> Result<Report, Failure> {
+fn replayed(file: &std::path::Path, monitor: Monitor) -> Result<Report, Failure> {
     let bytes = super::content::read_file(file)?;
     let wrong = |why: &dyn std::fmt::Display| Failure::Usage(format!("{}: {why}", file.display()));
     let reader = Reader::new(&bytes).map_err(|why| wrong(&why))?;
-    let decoder = Decoder::new([]);
+    let mut watcher = Watcher::from_the_start(monitor, Decoder::new([]));
     let (mut first, mut last) = (None, Monotonic::START);
     for record in reader {
         let (received, envelope) = match record {
@@ -201,9 +143,7 @@ fn replayed(file: &std::path::Path, mut monitor: Monitor) -> Result<Report, Fail
         let start = *first.get_or_insert(received.0);
         let elapsed = u64::try_from(received.0.saturating_sub(start)).unwrap_or_default();
         last = Monotonic::since_start(Duration::from_nanos(elapsed)).max(last);
-        if let Some(observation) = decoder.observation(last, &envelope) {
-            monitor.observe(&observation);
-        }
+        watcher.message(last, &envelope);
     }
-    Ok(monitor.finish(last))
+    Ok(watcher.finish(last))
 }

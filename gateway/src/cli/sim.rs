@@ -2,6 +2,7 @@
 
 mod crash;
 mod link;
+mod umaa;
 
 use super::exit::Failure;
 use clap::Subcommand;
@@ -15,6 +16,8 @@ pub(crate) struct Sim {
 
 #[derive(Subcommand)]
 enum What {
+    /// UMAA commands and ResourceAllocation over many nodes, watched from outside.
+    Umaa(umaa::Umaa),
     /// Lossy links drawn from seeds, with crashes, outages and wrong clocks.
     Link(link::SimLink),
     /// Both ends of a link are killed at moments of chance, with torn writes.
@@ -24,6 +27,7 @@ enum What {
 impl Sim {
     pub(crate) fn run(self) -> Result<(), Failure> {
         match self.what {
+            What::Umaa(args) => args.run(),
             What::Link(args) => args.run(),
             What::Crash(args) => args.run(),
         }

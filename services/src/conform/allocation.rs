@@ -1,10 +1,10 @@
 //! ResourceAllocation (ICD 5.1.3) as far as it can be seen from outside.
 
-use super::Clause;
 use super::command::Step;
 use super::ledger::{Debt, Ledger};
 use super::sample::Sample;
 use super::transition::is_terminal;
+use super::{Bounds, Clause};
 use aldis_envelope::{Guid, Monotonic};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -24,13 +24,32 @@ struct Holder {
     consumer: Guid,
 }
 
+/// A consumer that was in control.
+#[derive(Debug, Clone, Copy)]
+struct Former {
+    /// Since when reports no longer name it.
+    since: Monotonic,
+    /// When the arbiter knew that all have heard so: another consumer was given control.
+    confirmed: Option<Monotonic>,
+}
+
+impl Former {
+    /// Whether a provider may still go by it: the change is not confirmed, and not too long ago for that to matter.
+    fn may_be_believed(&self, now: Monotonic, bounds: Bounds) -> bool {
+        match self.confirmed {
+            Some(confirmed) => now - confirmed < bounds.slack,
+            None => now - self.since < bounds.slack + bounds.follow,
+        }
+    }
+}
+
 /// What an arbiter has reported last.
 #[derive(Debug, Default)]
 struct Arbiter {
     /// Every resource, with the consumer in control if there is one.
     holders: BTreeMap<Guid, Option<Guid>>,
-    /// Who was in control of what before, and until when: a provider may not have heard of the change.
-    former: BTreeMap<(Guid, Guid), Monotonic>,
+    /// Who was in control of what before: a provider may not have heard of the change.
+    former: BTreeMap<(Guid, Guid), Former>,
     /// Consumers from low to high.
     priorities: BTreeMap<Guid, Vec<Guid>>,
     /// The providers of a resource.
@@ -54,6 +73,20 @@ fn debt(clause: Clause, resource: Guid, who: Guid) -> Debt {
 /// The place on a list from low to high; none where it is not on it.
 fn rank(list: &[Guid], consumer: Guid) -> Option<usize> {
     list.iter().position(|listed| *listed == consumer)
+}
+
+/// Whether a resource is taken from a consumer for one of higher priority, by the list then or by the list now: a new one may
+/// have come in between.
+fn judge_take_over(
+    resource: Guid,
+    (loser, then): (Guid, &[Guid]),
+    (winner, now): (Guid, &[Guid]),
+    ledger: &mut Ledger,
+) {
+    let goes_before = |list: &[Guid]| rank(list, winner) > rank(list, loser);
+    ledger.judge(Clause::TakeOver, goes_before(now) || goes_before(then), || {
+        format!("resource {resource} is taken from {loser} for {winner}, which is not of higher priority")
+    });
 }
 
 impl Allocations {
@@ -93,17 +126,29 @@ impl Allocations {
                 let holder = |entry: &Sample| {
                     entry.value()["controlSession"]["controllingConsumer"].as_str()?.parse().ok()
                 };
-                let (now, slack) = (ledger.now(), ledger.bounds.slack);
-                arbiter.former.retain(|_, until| now - *until < slack);
-                let holders: BTreeMap<_, _> = entries.map(|(id, entry)| (id, holder(&entry))).collect();
+                let (now, bounds) = (ledger.now(), ledger.bounds);
+                arbiter.former.retain(|_, former| former.may_be_believed(now, bounds));
+                let holders: BTreeMap<Guid, Option<Guid>> =
+                    entries.map(|(id, entry)| (id, holder(&entry))).collect();
                 for (resource, before) in std::mem::take(&mut arbiter.holders) {
                     if let Some(before) =
                         before.filter(|before| holders.get(&resource) != Some(&Some(*before)))
                     {
-                        arbiter.former.insert((resource, before), ledger.now());
+                        let former = Former { since: now, confirmed: None };
+                        arbiter.former.insert((resource, before), former);
                     }
                 }
-                self.interrupted.retain(|resource, _| holders.get(resource) != Some(&None));
+                let list =
+                    |resource: &Guid| arbiter.priorities.get(resource).map(Vec::as_slice).unwrap_or_default();
+                for (resource, holder) in &holders {
+                    let is_over = |(loser, _): &(Guid, Vec<Guid>)| *holder != Some(*loser);
+                    if self.interrupted.get(resource).is_some_and(is_over)
+                        && let Some((loser, then)) = self.interrupted.remove(resource)
+                        && let Some(winner) = *holder
+                    {
+                        judge_take_over(*resource, (loser, &then), (winner, list(resource)), ledger);
+                    }
+                }
                 arbiter.holders = holders;
                 self.control_reported(source, ledger);
             }
@@ -169,6 +214,15 @@ impl Allocations {
             ledger.owe(expiry, duration + ledger.bounds.answer, text);
         }
         self.executing.insert(step.session, holder);
+        // Control is given when all have heard whom the report names, and so nobody before it any more (strong consistency).
+        let now = ledger.now();
+        if let Some(arbiter) = self.arbiters.get_mut(&step.provider) {
+            let formers =
+                arbiter.former.iter_mut().filter(|((of, who), _)| (*of, *who) != (resource, consumer));
+            formers.filter(|((of, _), _)| *of == resource).for_each(|(_, former)| {
+                former.confirmed.get_or_insert(now);
+            });
+        }
     }
 
     /// Whether control is given as it should be.
@@ -189,14 +243,10 @@ impl Allocations {
         ledger.judge(Clause::Listed, rank(list, consumer).is_some(), || {
             format!("resource {resource} is given to {consumer}, which is not on its list")
         });
-        if let Some((loser, then)) =
-            self.interrupted.remove(&resource).filter(|(loser, _)| *loser != consumer)
-        {
-            // A new list may have come in between.
-            let goes_before = |list: &[Guid]| rank(list, consumer) > rank(list, loser);
-            ledger.judge(Clause::TakeOver, goes_before(list) || goes_before(&then), || {
-                format!("resource {resource} is taken from {loser} for {consumer}, which is not of higher priority")
-            });
+        // A report that names the winner comes before; where it does not, this is the first that is seen of it.
+        let taken = self.interrupted.remove(&resource).filter(|(loser, _)| *loser != consumer);
+        if let Some((loser, then)) = taken {
+            judge_take_over(resource, (loser, &then), (consumer, list), ledger);
         }
         let told = known.and_then(|arbiter| *arbiter.holders.get(&resource)?);
         ledger.judge(Clause::ReportFirst, told == Some(consumer), || {
@@ -257,9 +307,9 @@ impl Allocations {
         for arbiter in self.arbiters.values() {
             let of_provider = arbiter.sources.iter().filter(|(_, sources)| sources.contains(&step.provider));
             for (resource, sources) in of_provider {
-                let crossed = |until: &Monotonic| ledger.now() - *until < ledger.bounds.slack;
+                let believed = |former: &Former| former.may_be_believed(ledger.now(), ledger.bounds);
                 let holds = arbiter.holders.get(resource) == Some(&Some(consumer))
-                    || arbiter.former.get(&(*resource, consumer)).is_some_and(crossed);
+                    || arbiter.former.get(&(*resource, consumer)).is_some_and(believed);
                 ledger.judge(Clause::Guard, holds || sources.contains(&consumer), || {
                     format!(
                         "{} executes a command of {consumer}, which does not control {resource}",

@@ -9,12 +9,16 @@ use aldis_envelope::{Guid, Monotonic};
 use session::Session;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-/// What a topic is in a command's family.
+/// What a topic is in a command's family (4.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Role {
+pub enum Role {
+    /// The commands themselves.
     Command,
+    /// Their statuses.
     Status,
+    /// Their acknowledgements.
     Ack,
+    /// Their execution statuses.
     ExecutionStatus,
 }
 
@@ -35,6 +39,13 @@ pub(super) fn part_of(topic: &str) -> Option<Part> {
     ];
     let found = endings.iter().find_map(|(ending, role)| Some((topic.strip_suffix(ending)?, *role)));
     found.map(|(family, role)| Part { family: family.to_owned(), role })
+}
+
+/// The role of a topic of UMAA in a command's family; none where it is a report, or no topic of UMAA. Version 6.0 names topics
+/// by their types.
+pub fn role_of(topic: &str) -> Option<Role> {
+    let name = topic.strip_suffix("Type").unwrap_or(topic);
+    part_of(name).filter(|_| name.starts_with("UMAA::")).map(|part| part.role)
 }
 
 /// A step of a command that was seen: for those who watch what commands do.
@@ -174,7 +185,7 @@ impl Commands {
 
     /// Contact with its writer is lost: nothing is owed by who is gone.
     pub(super) fn lost(&mut self, part: &Part, key: &Sample, ledger: &mut Ledger) {
-        self.with(part, key, |session| session.lost(part.role, ledger));
+        self.with(part, key, |session| session.vanished(part.role, ledger));
     }
 
     /// Whether the command is known.
@@ -192,4 +203,22 @@ impl Commands {
 fn id_of(part: &Part, key: &Sample) -> Option<SessionId> {
     let provider = if part.role == Role::Command { "destination" } else { "source" };
     Some((part.family.clone(), key.guid("sessionID")?, key.guid(provider)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_tell_the_role() {
+        let of = |name: &str| role_of(&format!("UMAA::SO::X::{name}"));
+        assert_eq!(of("XCommand"), Some(Role::Command));
+        assert_eq!(of("XCommandType"), Some(Role::Command));
+        assert_eq!(of("XCommandStatus"), Some(Role::Status));
+        assert_eq!(of("XCommandStatusType"), Some(Role::Status));
+        assert_eq!(of("XCommandAckReport"), Some(Role::Ack));
+        assert_eq!(of("XExecutionStatusReport"), Some(Role::ExecutionStatus));
+        assert_eq!(of("XReport"), None);
+        assert_eq!(role_of("afrl.cmasi.VehicleActionCommand"), None);
+    }
 }

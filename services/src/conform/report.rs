@@ -51,7 +51,7 @@ impl ClauseReport {
 }
 
 /// The findings.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Report {
     /// How many observations of UMAA topics there were.
     pub observations: u64,
@@ -64,6 +64,22 @@ pub struct Report {
 }
 
 impl Report {
+    /// Adds the findings of another watch.
+    pub fn add(&mut self, other: &Self) {
+        self.observations += other.observations;
+        self.open += other.open;
+        self.unfollowed += other.unfollowed;
+        if self.clauses.is_empty() {
+            self.clauses.clone_from(&other.clauses);
+            return;
+        }
+        for (clause, found) in self.clauses.iter_mut().zip(&other.clauses) {
+            clause.held += found.held;
+            clause.broken += found.broken;
+            clause.first = clause.first.take().or_else(|| found.first.clone());
+        }
+    }
+
     /// The clauses that were broken.
     pub fn broken(&self) -> impl Iterator<Item = &ClauseReport> {
         self.clauses.iter().filter(|clause| clause.verdict() == Verdict::Broken)

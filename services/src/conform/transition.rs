@@ -32,7 +32,7 @@ pub(super) fn is_legal(from: Option<&str>, to: &str) -> bool {
 }
 
 /// Whether figure 5 has that reason for the transition.
-pub(super) fn is_reason(from: Option<&str>, to: &str, reason: &str) -> bool {
+pub(crate) fn is_reason(from: Option<&str>, to: &str, reason: &str) -> bool {
     reasons(from, to).is_some_and(|reasons| reasons.contains(&reason))
 }
 

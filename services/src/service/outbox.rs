@@ -110,6 +110,11 @@ impl Outbox {
         self.actions.push(Action::Retire);
     }
 
+    /// Takes over what another outbox of the same service holds.
+    pub(crate) fn push(&mut self, action: Action) {
+        self.actions.push(action);
+    }
+
     pub(crate) fn drain(&mut self) -> std::vec::Drain<'_, Action> {
         self.actions.drain(..)
     }

@@ -23,6 +23,10 @@ pub struct FaultOptions {
     pub disk: DiskFaults,
     /// The share of samples that the bus drops because somebody does not keep up.
     pub sample_loss: f64,
+    /// The share of samples that the bus lets others overtake.
+    pub reordering: f64,
+    /// The share of samples that the bus delivers twice.
+    pub duplication: f64,
     /// How long a fault lasts at the most.
     pub lasts_at_most: Duration,
 }
@@ -84,6 +88,8 @@ impl Options {
                 read_fails: 0.0,
             },
             sample_loss: draw.share(0.0001, 0.05),
+            reordering: 0.0,
+            duplication: 0.0,
             lasts_at_most: draw.seconds(2.0, 60.0),
         };
         Self {
@@ -149,6 +155,8 @@ impl fmt::Display for Options {
             ("sync_fails", faults.disk.sync_fails),
             ("write_fails", faults.disk.write_fails),
             ("sample_loss", faults.sample_loss),
+            ("reordering", faults.reordering),
+            ("duplication", faults.duplication),
         ] {
             if share > 0.0 {
                 write!(f, " {name}={:.2}%", share * 100.0)?;

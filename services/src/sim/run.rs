@@ -73,7 +73,8 @@ pub fn run(workload: &dyn Workload, seed: u64, options: Options) -> Result<Repor
     }
     workload.begin(&mut world, &nodes);
     nodes.iter().for_each(|&node| world.restart(node));
-    world.set_sample_loss(options.faults.sample_loss);
+    let faulty = &options.faults;
+    world.set_bus_faults(faulty.sample_loss, faulty.reordering, faulty.duplication);
     safety(&mut world, &mut faults, options.safety);
     if world.violations().is_empty() {
         world.heal();

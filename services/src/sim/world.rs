@@ -12,6 +12,7 @@ use super::trace::Trace;
 use crate::event::{BridgeId, Effect, Event, PeerEvent, PeerId};
 use crate::node::{Node, NodeConfig};
 use aldis_envelope::{BootId, Keys, Label, Monotonic, Now};
+use bus::BusFaults;
 use bytes::Bytes;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -67,9 +68,9 @@ pub struct World {
     /// When the last sample on a way arrives: ways keep their order.
     last_arrival: BTreeMap<(usize, usize), Monotonic>,
     delay: (Duration, Duration),
-    /// The share of samples that the bus drops because somebody does not keep up.
-    sample_loss: f64,
     links: links::Links,
+    /// The shares of samples that the bus drops, lets others overtake and delivers twice.
+    bus_faults: BusFaults,
     facts: Facts,
     checkers: Vec<Box<dyn Checker>>,
     violations: Vec<Violation>,
@@ -88,8 +89,8 @@ impl World {
             routes: BTreeMap::new(),
             last_arrival: BTreeMap::new(),
             delay,
-            sample_loss: 0.0,
             links: links::Links::default(),
+            bus_faults: BusFaults::default(),
             facts: Facts::default(),
             checkers: Vec::new(),
             violations: Vec::new(),

@@ -15,6 +15,8 @@
 //! | [`Arbiter`], take-over | 5.1.3, table 33 | the loser is FAILED / INTERRUPTED before the report names the winner |
 //! | [`Arbiter`], confirmation | 5.1.3, strong consistency | EXECUTING once every reliable reader has the report; else FAILED / TIMEOUT and the report is withdrawn |
 //! | [`Arbiter`], a second session | 5.1.3 | of the holder replaces the first, which goes COMPLETED |
+//! | [`Arbiter`], a second session before control is given | 5.1.3 | takes the place of the first, which is FAILED / INTERRUPTED: COMPLETED would have to say EXECUTING first |
+//! | [`Guard`], between COMMANDED and EXECUTING | 5.1.3 | the consumer has to be in control still, after a restart of the provider too: nothing moves yet, and another may have taken over |
 //! | [`Arbiter`], a holder that a new list leaves out | 5.1.3 | keeps control, and cannot renew it: a new list does not move control that is held |
 //! | [`Arbiter`], priorities after a restart | 5.1.3 | those of the former life, which the ICD publishes for persistence; the log says where the configuration differs |
 

@@ -2,7 +2,6 @@
 
 pub(crate) mod asking;
 pub(crate) mod bus;
-pub(crate) mod checker;
 mod nodes;
 mod random;
 pub(crate) mod sea;

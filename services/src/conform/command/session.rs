@@ -31,6 +31,10 @@ pub(super) struct Session {
     acknowledged: bool,
     /// Who spoke about the command has unregistered, or contact is lost: its next life may go on, or begin anew.
     provider_gone: bool,
+    /// Contact was lost while a status was there: it may come again.
+    may_return: bool,
+    /// The status came again after that, and nothing new has been said since.
+    has_returned: bool,
     status_there: bool,
     ack_there: bool,
     execution_status_there: bool,
@@ -50,6 +54,8 @@ impl Session {
             last_status: None,
             acknowledged: false,
             provider_gone: false,
+            may_return: false,
+            has_returned: false,
             status_there: false,
             ack_there: false,
             execution_status_there: false,
@@ -64,7 +70,7 @@ impl Session {
     /// Whether nothing of it is left on the bus.
     pub(super) fn is_over(&self) -> bool {
         let said = self.status_there || self.ack_there || self.execution_status_there;
-        !said && (self.command.is_none() || self.disposed && self.is_terminal())
+        !said && !self.may_return && (self.command.is_none() || self.disposed && self.is_terminal())
     }
 
     /// Whether it was cancelled before anything was said of it: its provider may still take it up, or never hear of it.
@@ -113,7 +119,8 @@ impl Session {
         }
         let state = self.state.clone().unwrap_or_default();
         // The end may have crossed the update.
-        let in_time = self.ended.is_none_or(|ended| ledger.now() - ended <= ledger.bounds.slack);
+        let crossing = ledger.bounds.slack + ledger.bounds.unheard;
+        let in_time = self.ended.is_none_or(|ended| ledger.now() - ended <= crossing);
         self.judge(Clause::UpdateInTime, in_time, ledger, || format!("updated when it was {state}"));
         self.before.extend(self.command.replace(sample.clone()));
         if self.before.len() > BEFORE_MAX {
@@ -150,7 +157,9 @@ impl Session {
         let is_now = self.command.as_ref() == Some(&acknowledged);
         self.acknowledged |= is_now || retained;
         if is_now {
+            // Where a provider hears of the command as updated first, this is the answer.
             self.updates = 0;
+            ledger.pay(&self.debt(Clause::UpdateAnswered));
         }
         if self.command.is_some() {
             let matches = is_now || self.before.contains(&acknowledged);
@@ -192,10 +201,11 @@ impl Session {
         // The same sample again, after a restart of who carries it, is no new status.
         if self.last_status.as_ref() == Some(sample) {
             (self.status_there, self.provider_gone) = (true, false);
+            self.has_returned |= std::mem::take(&mut self.may_return);
             return None;
         }
         self.last_status = Some(sample.clone());
-        self.status_there = true;
+        (self.status_there, self.may_return, self.has_returned) = (true, false, false);
         self.correlate(retained, "a status", ledger);
         if std::mem::take(&mut self.provider_gone)
             && (to.as_str(), reason.as_str()) == ("ISSUED", "SUCCEEDED")
@@ -207,7 +217,7 @@ impl Session {
         }
         self.state = Some(to.clone());
         self.ended = is_terminal(&to).then_some(ledger.now());
-        self.after(&to, retained, ledger);
+        self.after(&to, &reason, retained, ledger);
         let (family, session, provider) = self.id.clone();
         Some(Step { family, provider, session, command: self.command.clone(), to, reason, retained })
     }
@@ -248,11 +258,12 @@ impl Session {
     }
 
     /// What the new state pays, and what it brings about.
-    fn after(&mut self, to: &str, retained: bool, ledger: &mut Ledger) {
+    fn after(&mut self, to: &str, reason: &str, retained: bool, ledger: &mut Ledger) {
         ledger.pay(&self.debt(Clause::Answered));
-        if to == "ISSUED" || is_terminal(to) {
+        // An update may have crossed the answer to the command before it, which is none to the update.
+        if reason == "UPDATED" || is_terminal(to) {
             ledger.pay(&self.debt(Clause::UpdateAnswered));
-            self.updates = if to == "ISSUED" { self.updates.saturating_sub(1) } else { 0 };
+            self.updates = if is_terminal(to) { 0 } else { self.updates.saturating_sub(1) };
         }
         if to == "EXECUTING" && self.has_execution_status && !retained {
             self.owe(Clause::ExecutionStatus, ledger, "no execution status while EXECUTING");
@@ -280,6 +291,13 @@ impl Session {
             return;
         }
         self.no_longer_there(role);
+        if role == Role::Status {
+            self.may_return = false;
+            // A provider that has started again clears up without a last word where the command is gone (4.1.2.1).
+            if self.has_returned {
+                ledger.forgive(&self.debt(Clause::CancelAnswered));
+            }
+        }
         if self.command.is_some() && !self.disposed {
             self.owe(Clause::CleanUpOrder, ledger, "what was said of it is disposed before its command");
         } else {
@@ -339,8 +357,14 @@ impl Session {
         self.lost(role, ledger);
     }
 
+    /// Contact with who wrote an instance is lost: it may come again.
+    pub(super) fn vanished(&mut self, role: Role, ledger: &mut Ledger) {
+        self.may_return |= role == Role::Status && self.status_there;
+        self.lost(role, ledger);
+    }
+
     /// Who wrote an instance is gone, and owes nothing any longer.
-    pub(super) fn lost(&mut self, role: Role, ledger: &mut Ledger) {
+    fn lost(&mut self, role: Role, ledger: &mut Ledger) {
         let consumer = [Clause::ConsumerCleanUp];
         let provider = [
             Clause::Answered,

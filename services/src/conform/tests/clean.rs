@@ -228,3 +228,62 @@ fn with_slack_writers_may_be_seen_out_of_order() {
     assert_eq!(run(1), []);
     assert_eq!(run(0), [Clause::CleanUpOrder]);
 }
+
+#[test]
+fn an_update_may_cross_the_first_answer() {
+    let mut scene = Scene::new();
+    scene.vector(ALICE, PILOT, 30);
+    let first = scene.command_now(VECTOR, 30);
+    scene.vector(ALICE, PILOT, 30);
+    // The provider has not heard of the update yet.
+    scene.status(VECTOR, PILOT, 30, "ISSUED", "SUCCEEDED");
+    scene.ack_of(VECTOR, PILOT, 30, first);
+    scene.status(VECTOR, PILOT, 30, "COMMANDED", "SUCCEEDED");
+    scene.status(VECTOR, PILOT, 30, "ISSUED", "UPDATED");
+    scene.ack(VECTOR, PILOT, 30);
+    scene.status(VECTOR, PILOT, 30, "COMMANDED", "SUCCEEDED");
+    // Or it hears of the command as updated first.
+    scene.vector(ALICE, PILOT, 31);
+    scene.vector(ALICE, PILOT, 31);
+    scene.accept(VECTOR, PILOT, 31);
+    scene.wait(6);
+    assert_eq!(finished(scene), []);
+}
+
+#[test]
+fn the_former_holder_is_let_through_until_another_has_control() {
+    let run = |is_given: bool| {
+        let mut scene = Scene::with_priorities();
+        scene.give(ALICE, 21, None);
+        scene.allocate(BOB, 22, None);
+        scene.accept(ALLOCATION, ARBITER, 22);
+        scene.status(ALLOCATION, ARBITER, 21, "FAILED", "INTERRUPTED");
+        scene.clean_up(ALLOCATION, ARBITER, 21);
+        scene.control(Some(BOB));
+        if is_given {
+            scene.status(ALLOCATION, ARBITER, 22, "EXECUTING", "SUCCEEDED");
+        }
+        // The pilot goes by the report before.
+        scene.vector(ALICE, PILOT, 30);
+        scene.execute(VECTOR, PILOT, 30);
+        finished(scene)
+    };
+    assert_eq!(run(false), []);
+    assert_eq!(run(true), [Clause::Guard]);
+
+    // Control that is given back to nobody is not confirmed; a provider that has not heard of it for long is at fault.
+    let after = |seconds: u64| {
+        let mut scene = Scene::with_priorities();
+        scene.give(ALICE, 21, None);
+        scene.command_change(ALLOCATION, 21, Observed::Dispose);
+        scene.status(ALLOCATION, ARBITER, 21, "CANCELED", "CANCELED");
+        scene.control(None);
+        scene.clear(ALLOCATION, ARBITER, 21);
+        scene.wait(seconds);
+        scene.vector(ALICE, PILOT, 30);
+        scene.execute(VECTOR, PILOT, 30);
+        finished(scene)
+    };
+    assert_eq!(after(5), []);
+    assert_eq!(after(11), [Clause::Guard]);
+}

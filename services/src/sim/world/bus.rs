@@ -10,6 +10,14 @@ use std::collections::BTreeSet;
 /// How many keys are remembered with those who subscribe to them.
 const ROUTES_MAX: usize = 65_536;
 
+/// What the bus does wrong, as shares of samples from 0 to 1.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct BusFaults {
+    pub(super) loss: f64,
+    pub(super) reordering: f64,
+    pub(super) duplication: f64,
+}
+
 impl World {
     /// Opens the session of a node: it hears the tokens that are there.
     pub fn open_bus(&mut self, of: NodeHandle) {
@@ -93,12 +101,29 @@ impl World {
             if to == from || !self.machines[to].hears(&self.machines[from]) {
                 continue;
             }
-            if self.sample_loss > 0.0 && self.random.f64() < self.sample_loss {
+            let faults = self.bus_faults;
+            if self.happens(faults.loss) {
                 continue;
             }
-            let (key, header, content) = (key.to_owned(), header.to_vec(), envelope.message.content.clone());
-            self.arrive(from, to, Arrival::Sample { from, key, deleted, header, content });
+            let times = 1 + usize::from(self.happens(faults.duplication));
+            for _ in 0..times {
+                let (key, header) = (key.to_owned(), header.to_vec());
+                let content = envelope.message.content.clone();
+                let sample = Arrival::Sample { from, key, deleted, header, content };
+                if self.happens(faults.reordering) {
+                    // It keeps no order with what goes the same way.
+                    let at = self.now + self.draw(self.delay) * 3;
+                    self.put(at, to, sample);
+                } else {
+                    self.arrive(from, to, sample);
+                }
+            }
         }
+    }
+
+    /// Whether something happens that has this chance. What never happens draws nothing.
+    fn happens(&mut self, chance: f64) -> bool {
+        chance > 0.0 && self.random.f64() < chance
     }
 
     /// The machines that subscribe to a key.

@@ -1,6 +1,7 @@
 //! What goes wrong in a world, and how it comes right again.
 
 use super::super::disk::DiskFaults;
+use super::bus::BusFaults;
 use super::{Arrival, NodeHandle, Seen, World};
 use crate::event::Event;
 use aldis_envelope::BootId;
@@ -81,14 +82,14 @@ impl World {
         self.machines[node.0].clocks.drift_ppm = drift_ppm;
     }
 
-    /// Sets the share of samples that the bus drops.
-    pub fn set_sample_loss(&mut self, share: f64) {
-        self.sample_loss = share;
+    /// Sets the shares of samples that the bus drops, lets others overtake and delivers twice.
+    pub fn set_bus_faults(&mut self, loss: f64, reordering: f64, duplication: f64) {
+        self.bus_faults = BusFaults { loss, reordering, duplication };
     }
 
     /// Ends all faults: every machine is on and connected, its disk is good. Clocks stay as wrong as they are.
     pub fn heal(&mut self) {
-        self.sample_loss = 0.0;
+        self.bus_faults = BusFaults::default();
         let sides = vec![0; self.machines.len()];
         self.partition(&sides, Duration::ZERO);
         for place in 0..self.machines.len() {

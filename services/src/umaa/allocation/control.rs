@@ -59,6 +59,8 @@ enum Ending {
     Interrupted(Guid),
     /// The same consumer has begun another.
     Replaced,
+    /// Likewise, before its readers have confirmed the report.
+    ReplacedUnconfirmed,
 }
 
 /// All control of all resources.
@@ -147,9 +149,11 @@ impl Control {
         let Some(managed) = self.resources.get_mut(&command.resource_id) else { return };
         let hold = Hold { session, ends, confirmation: Confirmation::Unsent };
         if let Some(before) = managed.hold.replace(hold).filter(|before| before.session != session) {
-            let ending = match before.session.source == session.source {
-                true => Ending::Replaced,
-                false => Ending::Interrupted(session.source),
+            let is_given = before.confirmation == Confirmation::Given;
+            let ending = match (before.session.source == session.source, is_given) {
+                (true, true) => Ending::Replaced,
+                (true, false) => Ending::ReplacedUnconfirmed,
+                (false, _) => Ending::Interrupted(session.source),
             };
             self.ending.insert(before.session, ending);
         }
@@ -285,9 +289,12 @@ impl Executor<ResourceAllocationCommand> for Control {
         let Some(managed) = self.resources.get_mut(&resource).filter(|managed| managed.hold.is_none()) else {
             return false;
         };
+        // The wall clock may have stepped back meanwhile: control does not last longer than it was asked for.
+        let most = commanded.command.duration.map_or(Duration::MAX, Duration::from);
         let ends = former.end_time.map(|end| {
             let left = Wall::from(end).0.saturating_sub(now.wall.0);
-            (now.monotonic + Duration::from_nanos(u64::try_from(left).unwrap_or(0)), end)
+            let left = Duration::from_nanos(u64::try_from(left).unwrap_or(0)).min(most);
+            (now.monotonic + left, end)
         });
         managed.hold = Some(Hold { session: commanded.id, ends, confirmation: Confirmation::Given });
         true
@@ -333,6 +340,11 @@ impl Ending {
                 Progress::Failed(super::super::command::decisions::failure_at_preemption(text))
             }
             Self::Replaced => Progress::Completed,
+            // It was never in control, and must not say that it was: EXECUTING comes before COMPLETED.
+            Self::ReplacedUnconfirmed => {
+                let text = "a newer session of the same consumer took its place before control was given";
+                Progress::Failed(super::super::command::decisions::failure_at_preemption(text))
+            }
         }
     }
 }

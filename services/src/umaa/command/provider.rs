@@ -56,6 +56,8 @@ enum Step {
     None,
     /// Whether it is valid and admitted.
     Validating,
+    /// Whether its consumer is still let through.
+    Starting,
     /// How it goes.
     Started,
 }

@@ -2,8 +2,8 @@
 //! those who come later, what a former life retained, liveliness, confirmations. Delays, crashes and silent links come from
 //! the test; everything else from the seed.
 
-use super::checker::Checker;
 use crate::service::{Action, Input, Outbox, Service, Unconfirmed};
+use crate::sim::umaa::flow::Flow;
 use aldis_envelope::{
     BootId, Change, EntityId, Envelope, Fleet, GuidForm, Guids, KeyHash, Message, Monotonic, Now, Prefix,
     Priority, ServiceId, Source, Stamp, Wall,
@@ -79,7 +79,7 @@ pub(crate) struct Bus {
     held_back: BTreeMap<(Source, Source), Vec<Arrival>>,
     silent: BTreeSet<(Source, Source)>,
     confirming: BTreeMap<u64, Confirming>,
-    pub(crate) checker: Checker,
+    pub(crate) checker: Flow,
     pub(crate) notes: Vec<String>,
 }
 
@@ -96,7 +96,7 @@ impl Bus {
             held_back: BTreeMap::new(),
             silent: BTreeSet::new(),
             confirming: BTreeMap::new(),
-            checker: Checker::default(),
+            checker: Flow::default(),
             notes: Vec::new(),
         }
     }

@@ -167,6 +167,24 @@ fn a_second_session_of_the_holder_replaces_the_first() {
 }
 
 #[test]
+fn a_session_that_is_replaced_before_it_has_control_never_says_that_it_had() {
+    let mut sea = sea();
+    let one = allocating(&mut sea.bus, captain(1));
+    sea.run(1.0);
+    // A reader does not confirm, so that nobody is in control yet.
+    sea.bus.silence(arbiter(), steersman());
+    sea.allocate(&one, captain(1), None);
+    sea.run(0.1);
+    sea.allocate(&one, captain(1), None);
+    sea.run(0.1);
+    assert_eq!(told(one.take()), "ISSUED COMMANDED ISSUED COMMANDED FAILED/INTERRUPTED");
+    sea.bus.heal(arbiter(), steersman());
+    sea.run(1.0);
+    assert_eq!((told(one.take()).as_str(), sea.holder()), ("EXECUTING", Some(guid(captain(1)))));
+    sea.is_lawful();
+}
+
+#[test]
 fn control_waits_for_every_reader_and_fails_where_one_is_silent() {
     let mut sea = sea();
     let one = allocating(&mut sea.bus, captain(1));

@@ -43,10 +43,8 @@ impl<C: Command, E: Executor<C>, A: Admission> Provider<C, E, A> {
                 return self.ask_validity(now, id, out);
             }
             Effect::Start => {
-                let held = self.held.get_mut(&id)?;
-                (held.step, held.was_started) = (Step::Started, true);
-                let progress = self.executor.start(now, held.commanded(id), out);
-                return self.progressed(id, progress, out);
+                self.held.get_mut(&id)?.step = Step::Starting;
+                return self.ask_start(now, id, out);
             }
             Effect::Resume => {
                 let held = self.held.get_mut(&id)?;
@@ -124,6 +122,38 @@ impl<C: Command, E: Executor<C>, A: Admission> Provider<C, E, A> {
         }
     }
 
+    /// Starts a command where its consumer is still let through. One that a former life has taken was let through by what was
+    /// so then.
+    fn ask_start(&mut self, now: Now, id: SessionId, out: &mut Outbox) -> Option<Event> {
+        match self.admission.admits(now, id.source) {
+            Verdict::Valid => {}
+            Verdict::Later => return None,
+            Verdict::Failed(failure) => return Some(Event::Broken(Stop::Broken, failure)),
+        }
+        let held = self.held.get_mut(&id)?;
+        (held.step, held.was_started) = (Step::Started, true);
+        let progress = self.executor.start(now, held.commanded(id), out);
+        self.progressed(id, progress, out)
+    }
+
+    /// How a command goes that was started. It may not come to be executed while its consumer is not let through.
+    fn ask_started(
+        &mut self,
+        now: Now,
+        id: SessionId,
+        state: Option<CommandState>,
+        out: &mut Outbox,
+    ) -> Option<Event> {
+        if state == Some(CommandState::Commanded) {
+            match self.admission.admits(now, id.source) {
+                Verdict::Valid => {}
+                Verdict::Later => return None,
+                Verdict::Failed(failure) => return Some(Event::Broken(Stop::Broken, failure)),
+            }
+        }
+        self.ask_progress(now, id, out)
+    }
+
     fn ask_progress(&mut self, now: Now, id: SessionId, out: &mut Outbox) -> Option<Event> {
         let held = self.held.get(&id)?;
         let progress = self.executor.progress(now, held.commanded(id), out);
@@ -199,7 +229,8 @@ impl<C: Command, E: Executor<C>, A: Admission> Provider<C, E, A> {
         let Some(held) = self.held.get(&id).filter(|held| held.session.is_open()) else { return false };
         let (before, step) = (held.session.state(), held.step);
         let late = held.limit.is_some_and(|limit| limit <= now.monotonic);
-        let ended = if step == Step::Started { self.admission.ends(now, id.source) } else { None };
+        let was_taken = matches!(step, Step::Starting | Step::Started);
+        let ended = if was_taken { self.admission.ends(now, id.source) } else { None };
         let event = match (late, ended, step) {
             (true, ..) => {
                 let state = before.map_or("", CommandState::name);
@@ -208,7 +239,8 @@ impl<C: Command, E: Executor<C>, A: Admission> Provider<C, E, A> {
             }
             (false, Some(failure), _) => Some(Event::Broken(Stop::Broken, failure)),
             (false, None, Step::Validating) => self.ask_validity(now, id, out),
-            (false, None, Step::Started) => self.ask_progress(now, id, out),
+            (false, None, Step::Starting) => self.ask_start(now, id, out),
+            (false, None, Step::Started) => self.ask_started(now, id, before, out),
             (false, None, Step::None) => None,
         };
         if let Some(event) = event {

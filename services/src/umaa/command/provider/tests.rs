@@ -436,3 +436,54 @@ fn only_what_this_provider_said_itself_counts_as_its_past() {
     assert_eq!(*sea.asked.lock().unwrap(), ["start 90"]);
     assert_eq!(sea.told(), "ISSUED COMMANDED EXECUTING left:2 Completed");
 }
+
+/// A door that a test shuts.
+struct Door(Arc<std::sync::atomic::AtomicBool>);
+
+impl Admission for Door {
+    fn admits(&self, _: Now, _: Guid) -> crate::umaa::command::Verdict {
+        match self.0.load(std::sync::atomic::Ordering::Relaxed) {
+            true => crate::umaa::command::Verdict::Valid,
+            false => crate::umaa::command::Verdict::Failed(Failure::new(FailureKind::Rejected, "shut")),
+        }
+    }
+
+    fn ends(&self, _: Now, _: Guid) -> Option<Failure> {
+        None
+    }
+}
+
+/// What a consumer hears of a command that waits in COMMANDED while its consumer is shut out, with or without a new life of
+/// the provider in between.
+fn shut_out(crashes: bool) -> String {
+    let mut sea = sea();
+    let door = Arc::new(std::sync::atomic::AtomicBool::new(true));
+    let (given, asked) = (door.clone(), sea.asked.clone());
+    let at = source(400, 101);
+    let settings = ProviderSettings { start_within: Some(20 * SECOND), ..ProviderSettings::default() };
+    let factory: Factory =
+        Arc::new(move || provider(at, &guids(), settings.clone(), Door(given.clone()), asked.clone()));
+    sea.bus.add(at, 0, factory);
+    sea.wish(move |consumer, now, out| {
+        consumer.start(now, guids().of_service(at), steer(90.0, 5, "slow to start"), out).unwrap();
+    });
+    sea.run(2);
+    if crashes {
+        sea.bus.crash(at);
+    }
+    door.store(false, std::sync::atomic::Ordering::Relaxed);
+    if crashes {
+        sea.bus.start(at);
+    } else {
+        sea.bus.wake(at);
+    }
+    sea.run(2);
+    sea.is_clean();
+    sea.told()
+}
+
+#[test]
+fn a_command_that_waits_to_start_is_rejected_where_its_consumer_is_no_longer_let_through() {
+    assert_eq!(shut_out(false), "ISSUED COMMANDED FAILED/RESOURCE_REJECTED");
+    assert_eq!(shut_out(true), "ISSUED COMMANDED FAILED/RESOURCE_REJECTED");
+}
