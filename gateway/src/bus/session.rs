@@ -34,7 +34,7 @@ pub(crate) struct BusError {
     why: String,
 }
 
-fn failed<E: std::fmt::Display>(doing: &'static str) -> impl Fn(E) -> BusError {
+pub(super) fn failed<E: std::fmt::Display>(doing: &'static str) -> impl Fn(E) -> BusError {
     move |why| BusError { doing, why: why.to_string() }
 }
 
@@ -242,7 +242,7 @@ impl Bus {
 }
 
 /// Runs what Zenoh blocks in on a thread of its own: inside a runtime of one thread Zenoh refuses to block.
-async fn off_the_loop<T: Send + 'static>(
+pub(super) async fn off_the_loop<T: Send + 'static>(
     blocking: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, tokio::sync::oneshot::error::RecvError> {
     let (tell, told) = tokio::sync::oneshot::channel();
