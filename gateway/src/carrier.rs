@@ -30,11 +30,6 @@ impl Carriers {
         self.0.remove(&(link, carrier));
     }
 
-    /// The same, where dropping it may block.
-    pub(crate) fn take(&mut self, link: LinkId, carrier: CarrierId) -> Option<Box<dyn Outgoing>> {
-        self.0.remove(&(link, carrier))
-    }
-
     pub(crate) fn send(&mut self, link: LinkId, carrier: CarrierId, frame: &[u8]) {
         if let Some(outgoing) = self.0.get_mut(&(link, carrier)) {
             outgoing.send(frame);

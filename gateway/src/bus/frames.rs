@@ -41,11 +41,23 @@ impl Channel {
     }
 }
 
-struct Putter(Publisher<'static>);
+/// Something of Zenoh's that is dropped on a thread of its own: dropping it blocks, which a runtime of one thread must not.
+struct Elsewhere<T: Send + 'static>(Option<T>);
+
+impl<T: Send + 'static> Drop for Elsewhere<T> {
+    fn drop(&mut self) {
+        let inner = self.0.take();
+        // Where no thread can be had it is dropped here.
+        let _ = std::thread::Builder::new().name("bus".into()).spawn(move || drop(inner));
+    }
+}
+
+struct Putter(Elsewhere<Publisher<'static>>);
 
 impl Outgoing for Putter {
     fn send(&mut self, frame: &[u8]) {
-        if let Err(why) = self.0.put(frame).wait() {
+        let Some(publisher) = &self.0.0 else { return };
+        if let Err(why) = publisher.put(frame).wait() {
             tracing::debug!("zenoh: a frame is dropped: {why}");
         }
     }
@@ -56,8 +68,10 @@ pub(crate) async fn serve(core: Shared, channel: Channel) {
     loop {
         let why = match open(&channel).await {
             Ok((session, publisher, subscriber, frames)) => {
-                receive(&core, &channel, &session, publisher, frames).await;
-                let _ = off_the_loop(move || drop((subscriber, session.close().wait()))).await;
+                // What is declared goes before the session.
+                let open = Elsewhere(Some((subscriber, session)));
+                let publisher = Putter(Elsewhere(Some(publisher)));
+                receive(&core, &channel, &open, publisher, frames).await;
                 "the session is gone".to_owned()
             }
             Err(why) => why.to_string(),
@@ -104,14 +118,14 @@ async fn open(channel: &Channel) -> Result<Opened, BusError> {
 async fn receive(
     core: &Shared,
     channel: &Channel,
-    session: &Session,
-    publisher: Publisher<'static>,
+    open: &Elsewhere<(Subscriber<()>, Session)>,
+    publisher: Putter,
     mut frames: mpsc::Receiver<bytes::Bytes>,
 ) {
     let (link, carrier) = (channel.link, channel.carrier);
     {
         let mut core = core.lock();
-        core.carriers().set(link, carrier, Box::new(Putter(publisher)));
+        core.carriers().set(link, carrier, Box::new(publisher));
         core.handle(&mut vec![Event::Link(link, LinkEvent::Up(carrier, channel.mtu))]);
     }
     loop {
@@ -122,13 +136,11 @@ async fn receive(
                 core.lock().handle(&mut vec![Event::Link(link, event)]);
             }
             () = tokio::time::sleep(CHECK_EVERY) => {
-                if session.is_closed() {
+                if open.0.as_ref().is_none_or(|(_, session)| session.is_closed()) {
                     break;
                 }
             }
         }
     }
-    // Dropping what is declared may block: not on the loop.
-    let outgoing = core.lock().carriers().take(link, carrier);
-    let _ = off_the_loop(move || drop(outgoing)).await;
+    core.lock().carriers().remove(link, carrier);
 }
