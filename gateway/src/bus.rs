@@ -1,5 +1,6 @@
 //! The bus: the only place that knows Zenoh.
 
+pub(crate) mod frames;
 mod inbox;
 mod outlet;
 mod session;

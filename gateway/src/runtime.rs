@@ -99,6 +99,9 @@ async fn drive(
         let core = core.clone();
         tasks.spawn_blocking(move || serial::serve(&core, &line));
     }
+    for channel in outside.channels {
+        tasks.spawn_local(crate::bus::frames::serve(core.clone(), channel));
+    }
     let (closed, mut is_closed) = watch::channel(false);
     let bus = bus_task::keep(core.clone(), inbox, keys, outside.bus, silenced, closed);
     tasks.spawn_local(bus);

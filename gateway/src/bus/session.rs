@@ -239,7 +239,7 @@ impl Bus {
 }
 
 /// Runs what Zenoh blocks in on a thread of its own: inside a runtime of one thread Zenoh refuses to block.
-async fn off_the_loop<T: Send + 'static>(
+pub(super) async fn off_the_loop<T: Send + 'static>(
     blocking: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, tokio::sync::oneshot::error::RecvError> {
     let (tell, told) = tokio::sync::oneshot::channel();

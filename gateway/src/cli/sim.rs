@@ -1,6 +1,7 @@
 //! `aldis sim`: the simulator, in virtual time.
 
 mod crash;
+mod hostile;
 mod link;
 mod umaa;
 
@@ -22,6 +23,8 @@ enum What {
     Link(link::SimLink),
     /// Both ends of a link are killed at moments of chance, with torn writes.
     Crash(crash::SimCrash),
+    /// Frames of strangers, given to a link.
+    Hostile(hostile::SimHostile),
 }
 
 impl Sim {
@@ -30,6 +33,7 @@ impl Sim {
             What::Umaa(args) => args.run(),
             What::Link(args) => args.run(),
             What::Crash(args) => args.run(),
+            What::Hostile(args) => args.run(),
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::bus_task::Joining;
 use crate::bridge::uxas_tcp::{Endpoint, Side};
 use crate::bus::Congestion;
+use crate::bus::frames::Channel;
 use crate::carrier::{serial, udp};
 use crate::clock;
 use crate::config::{self, Config, bus};
@@ -20,6 +21,7 @@ pub(crate) struct Outside {
     pub(super) link_keys: Vec<Vec<LinkKey>>,
     pub(super) udp: Vec<udp::Port>,
     pub(super) lines: Vec<serial::Line>,
+    pub(super) channels: Vec<Channel>,
 }
 
 impl Outside {
@@ -29,6 +31,7 @@ impl Outside {
         self.udp.iter_mut().for_each(|port| port.ends.retain(|end| end.link.0 < links));
         self.udp.retain(|port| !port.ends.is_empty());
         self.lines.retain(|line| line.link.0 < links);
+        self.channels.retain(|channel| channel.link.0 < links);
         self
     }
 }
@@ -64,7 +67,28 @@ pub(crate) fn outside(config: &Config) -> Result<Outside, OutsideError> {
     let link_keys = config.links.iter().map(|link| link.keys.iter().map(config::KeyFile::read).collect());
     let link_keys = link_keys.collect::<Result<_, _>>()?;
     let (udp, lines) = carriers(config);
-    Ok(Outside { bus, bridges: bridges.collect(), link_keys, udp, lines })
+    let channels = channels(config)?;
+    Ok(Outside { bus, bridges: bridges.collect(), link_keys, udp, lines, channels })
+}
+
+/// The carriers over Zenoh networks of their own.
+fn channels(config: &Config) -> Result<Vec<Channel>, bus::BusError> {
+    let mut channels = Vec::new();
+    for (link, configured) in config.links.iter().enumerate() {
+        for (place, carrier) in configured.carriers.iter().enumerate() {
+            let Some(network) = carrier.network() else { continue };
+            channels.push(Channel {
+                link: LinkId(link),
+                carrier: CarrierId(place as u8),
+                fleet: config.fleet.clone(),
+                own: config.entities.own(),
+                peer: configured.peer,
+                config: bus::zenoh_config(&network)?,
+                mtu: carrier.mtu as usize,
+            });
+        }
+    }
+    Ok(channels)
 }
 
 /// The carriers of all links; those that listen at one address share a socket.

@@ -2,9 +2,10 @@
 
 use super::event::Ticket;
 use super::ranges::Ranges;
-use aldis_envelope::{KeyHash, Monotonic};
+use aldis_envelope::{KeyHash, Label, Monotonic};
 use bytes::Bytes;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// How many large messages of the peer may be unfinished.
 const UNFINISHED_MAX: usize = 4;
@@ -25,7 +26,12 @@ pub(super) struct Transfer {
     pub(super) started: bool,
     /// How many pieces went out.
     pub(super) pieces: u32,
+    /// Where it is a state: of what, so that a newer one takes its place.
+    state_of: Option<StateOf>,
 }
+
+/// What a large state is of.
+pub(super) type StateOf = (Arc<Label>, Option<KeyHash>);
 
 /// A digest that tells two messages apart.
 pub(super) fn digest_of(bytes: &[u8]) -> u64 {
@@ -46,14 +52,28 @@ impl BulkOut {
         self.bytes
     }
 
-    pub(super) fn add(&mut self, ticket: Ticket, since: Monotonic, bytes: Bytes) -> u32 {
+    /// Takes a message in. A state takes the place of an older one of its instance of which nothing went out yet: that one's
+    /// ticket comes back.
+    pub(super) fn add(
+        &mut self,
+        ticket: Ticket,
+        since: Monotonic,
+        bytes: Bytes,
+        state_of: Option<StateOf>,
+    ) -> Option<Ticket> {
+        let older = |transfer: &Transfer| {
+            state_of.is_some() && transfer.state_of == state_of && transfer.pieces == 0 && !transfer.started
+        };
+        let older = self.transfers.iter().find(|(_, transfer)| older(transfer)).map(|(&number, _)| number);
+        let superseded = older.and_then(|number| self.remove(number)).map(|transfer| transfer.ticket);
         self.next += 1;
         self.bytes += bytes.len();
         let digest = digest_of(&bytes);
         let (arrived, on_air) = (Ranges::default(), Ranges::default());
-        let transfer = Transfer { ticket, since, bytes, digest, arrived, on_air, started: false, pieces: 0 };
+        let transfer =
+            Transfer { ticket, since, bytes, digest, arrived, on_air, started: false, pieces: 0, state_of };
         self.transfers.insert(self.next, transfer);
-        self.next
+        superseded
     }
 
     /// The next piece of at most `length` bytes: transfer, start, end.
@@ -256,7 +276,8 @@ mod tests {
     #[test]
     fn pieces_go_out_once_unless_they_are_lost() {
         let mut out = BulkOut::default();
-        let number = out.add(Ticket(1), Monotonic::START, message());
+        assert_eq!(out.add(Ticket(1), Monotonic::START, message(), None), None);
+        let number = 1;
         let mut pieces = Vec::new();
         while let Some((_, start, end)) = out.next(9_000) {
             out.sent(number, start, end);

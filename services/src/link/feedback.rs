@@ -16,6 +16,9 @@ pub(super) const DELAY_UNIT: Duration = Duration::from_millis(8);
 /// How many expired commands without word are remembered, so that late word is not lost.
 const IN_DOUBT_MAX: usize = 1_024;
 
+/// The part of a round trip after which the last samples of a re-synchronisation go again.
+const AGAIN_AFTER: u32 = 2;
+
 impl Link {
     pub(super) fn on_ack(&mut self, now: Now, index: usize, item: &Item<'_>, effects: &mut Vec<Effect>) {
         let Item::Ack { delay, .. } = item else { return };
@@ -148,7 +151,27 @@ impl Link {
                 self.on_lost(now.monotonic, frame, false);
             }
         }
+        self.send_states_again(now.monotonic);
         self.notice_silence(now.monotonic, effects);
+    }
+
+    /// The tail of a re-synchronisation: while nothing else is to go out, the last samples go a second time before their loss can be
+    /// known, because a round trip is longer than a frame.
+    fn send_states_again(&mut self, now: Monotonic) {
+        if self.states_again_at(now).is_some_and(|at| at <= now) {
+            self.states.again(now);
+        }
+    }
+
+    /// When that is to be done next.
+    pub(super) fn states_again_at(&self, now: Monotonic) -> Option<Monotonic> {
+        if self.compare != Compare::Wanted || self.is_due(now) {
+            return None;
+        }
+        let path = &self.paths[self.active(now)?];
+        let lonely = self.states.lonely_since()?;
+        let soon = path.is_heard(now) && path.loss_out >= 0.05;
+        soon.then_some((lonely + path.round_trip() / AGAIN_AFTER).max(path.next_send))
     }
 
     fn notice_silence(&mut self, now: Monotonic, effects: &mut Vec<Effect>) {

@@ -1,6 +1,7 @@
 //! Messages that are to cross: refused at once with a reason, or taken in.
 
 use super::body::{LabelEntry, Origin, microseconds, write_message, write_whole};
+use super::export::Newest;
 use super::inbox::COMMAND_BYTES_MAX;
 use super::journal::{AfterWrite, name_key};
 use super::names::{Definition, InstanceEntry, NameId, Numbered, Table, TooMany};
@@ -131,7 +132,12 @@ impl Link {
         };
         let named = self.is_named(number, &sample);
         let replaced = self.states.is_waiting(number);
-        if !self.states.offer(number, sample, offer.interval, named) || replaced {
+        if offer.newest == Newest::Stream {
+            let instances = &self.names.instances;
+            let of_stream = |other: u32| instances.get(&other).is_some_and(|entry| entry.label == label);
+            self.counters.states_conflated += self.states.supersede(number, of_stream);
+        }
+        if !self.states.offer(number, sample, (offer.interval, offer.share), named) || replaced {
             self.counters.states_conflated += 1;
         }
         Ok(())
@@ -154,7 +160,14 @@ impl Link {
         if self.bulk_out.bytes() + bytes.len() > limit {
             return Err(Reason::QueueFull(self.bulk_out.transfers.len()));
         }
-        self.bulk_out.add(offer.ticket, now.monotonic, bytes.into());
+        let message = &offer.envelope.message;
+        let state_of = (offer.class == Class::State)
+            .then(|| (message.label.clone(), message.instance.as_ref().map(|instance| instance.hash)));
+        let superseded = self.bulk_out.add(offer.ticket, now.monotonic, bytes.into(), state_of);
+        if let Some(ticket) = superseded {
+            self.counters.states_conflated += 1;
+            self.tell(ticket, TicketState::Cancelled { tries: 0 }, effects);
+        }
         self.tell(offer.ticket, TicketState::Accepted { estimate: None }, effects);
         Ok(())
     }

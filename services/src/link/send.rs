@@ -226,6 +226,7 @@ impl Link {
         at(self.session.hello_again());
         if self.active(now) == Some(index) {
             if path.is_heard(now) {
+                at(self.states_again_at(now));
                 at(self.is_due(now).then_some(now));
                 at(self.outbox.next_due(now));
             } else {

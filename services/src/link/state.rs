@@ -17,6 +17,10 @@ const SHORT_AGE: Duration = Duration::from_secs(16);
 /// Numbers in short form are told modulo this.
 pub(super) const SHORT_NUMBERS: u64 = 128;
 
+/// How many samples may be on the air for the last of them to go twice: about a frame of the shortest. More, and the bytes are worth
+/// more than the time.
+const AGAIN_MAX: usize = 12;
+
 /// Times in short form are told modulo so many units: 1 024 s.
 pub(super) const SHORT_TIMES: i64 = 1 << 14;
 
@@ -47,8 +51,12 @@ struct Instance {
     sample: Option<Sample>,
     held: Option<Mark>,
     on_air: Option<(u32, u64)>,
+    /// When the sample on the air went out; none where a second copy of it has gone after it.
+    single_since: Option<Monotonic>,
     not_before: Monotonic,
     interval: Duration,
+    /// The rule that lets it cross, and the part of the bytes that all under that rule may take, in per cent.
+    share: (u32, u8),
 }
 
 /// The states of one direction.
@@ -64,17 +72,25 @@ pub(super) struct States {
     /// Where the round has come to.
     cursor: u32,
     on_air: usize,
+    /// When those under a rule with a share may go again.
+    rules: BTreeMap<u32, Monotonic>,
 }
 
 impl States {
     /// A new sample; an older one that was not sent is replaced. False where it is older than what is there.
-    pub(super) fn offer(&mut self, number: u32, sample: Sample, interval: Duration, named: bool) -> bool {
+    pub(super) fn offer(
+        &mut self,
+        number: u32,
+        sample: Sample,
+        (interval, share): (Duration, (u32, u8)),
+        named: bool,
+    ) -> bool {
         let instance = self.instances.entry(number).or_default();
         let older = |held: (u32, u64)| held.0 == sample.origin && held.1 >= sample.sequence;
         if instance.sample.as_ref().is_some_and(|held| older((held.origin, held.sequence))) {
             return false;
         }
-        instance.interval = interval;
+        (instance.interval, instance.share) = (interval, share);
         let (not_before, since) = (instance.not_before, sample.since);
         instance.sample = Some(sample);
         if !named {
@@ -85,6 +101,23 @@ impl States {
             self.due.insert(number);
         }
         true
+    }
+
+    /// Samples of other instances of a stream that wait are superseded. How many.
+    pub(super) fn supersede(&mut self, number: u32, is_of_stream: impl Fn(u32) -> bool) -> u64 {
+        let waiting = self.due.iter().chain(&self.nameless).copied();
+        let waiting = waiting.chain(self.later.iter().map(|(_, number)| *number));
+        let others: Vec<_> = waiting.filter(|other| *other != number && is_of_stream(*other)).collect();
+        for other in &others {
+            self.due.remove(other);
+            self.nameless.remove(other);
+            if let Some(instance) = self.instances.get_mut(other) {
+                self.later.remove(&(instance.not_before, *other));
+                // What the peer holds of it stays; a digest must not ask for what nobody wants.
+                instance.sample = None;
+            }
+        }
+        others.len() as u64
     }
 
     /// The peer has got names: what waited for them may go.
@@ -137,6 +170,9 @@ impl States {
     pub(super) fn next(&mut self, now: Monotonic) -> Option<(u32, Sample)> {
         loop {
             let number = *self.due.range(self.cursor..).next().or_else(|| self.due.first())?;
+            if self.put_off(now, number) {
+                continue;
+            }
             let sample = self.instances.get(&number).and_then(|instance| instance.sample.clone());
             match sample {
                 Some(sample) if sample.expires.is_none_or(|expires| expires > now) => {
@@ -149,16 +185,55 @@ impl States {
         }
     }
 
-    /// The instance's sample went out.
-    pub(super) fn sent(&mut self, number: u32, now: Monotonic) {
+    /// Where the rule of an instance has had its share for now, the instance waits until the rule's turn.
+    fn put_off(&mut self, now: Monotonic, number: u32) -> bool {
+        let Some(instance) = self.instances.get_mut(&number) else { return false };
+        let until = self.rules.get(&instance.share.0).copied().filter(|until| *until > now);
+        if let Some(until) = until {
+            self.due.remove(&number);
+            instance.not_before = until;
+            self.later.insert((until, number));
+        }
+        until.is_some()
+    }
+
+    /// The instance's sample went out, and took the carrier for so long.
+    pub(super) fn sent(&mut self, number: u32, now: Monotonic, airtime: Duration) {
         self.due.remove(&number);
         self.cursor = number.wrapping_add(1);
         let Some(instance) = self.instances.get_mut(&number) else { return };
+        let (rule, share) = instance.share;
+        if share < 100 {
+            let until = self.rules.get(&rule).copied().unwrap_or(now).max(now);
+            self.rules.insert(rule, until + airtime * 100 / u32::from(share.max(1)));
+        }
         instance.not_before = now + instance.interval;
         if instance.on_air.is_none() {
             self.on_air += 1;
         }
-        instance.on_air = instance.sample.as_ref().map(|sample| (sample.origin, sample.sequence));
+        let on_air = instance.sample.as_ref().map(|sample| (sample.origin, sample.sequence));
+        instance.single_since = (instance.on_air != on_air).then_some(now);
+        instance.on_air = on_air;
+    }
+
+    /// When the oldest of those samples went out that are on the air in one copy, where they are few.
+    pub(super) fn lonely_since(&self) -> Option<Monotonic> {
+        if self.on_air > AGAIN_MAX {
+            return None;
+        }
+        let on_air = self.instances.values().filter(|instance| instance.on_air.is_some());
+        on_air.filter_map(|instance| instance.single_since).min()
+    }
+
+    /// Nothing else is to go out: what went out once before `since`, and of which no word came, goes again.
+    pub(super) fn again(&mut self, since: Monotonic) {
+        for (&number, instance) in &mut self.instances {
+            let lonely = instance.single_since.is_some_and(|at| at <= since);
+            if lonely && instance.on_air.is_some() {
+                instance.single_since = None;
+                self.due.insert(number);
+            }
+        }
     }
 
     /// A sample arrived.

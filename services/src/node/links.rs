@@ -14,7 +14,6 @@ use crate::link::{
     self, BatchId, CarrierId, Link, LinkSpec, Offer, Record, Ticket, TicketState, record_prefix,
 };
 use crate::service::Level;
-use aldis_envelope::aldis::link as told;
 use aldis_envelope::umaa::{CommandKey, Key};
 use aldis_envelope::{
     Address, CallId, EntityId, Envelope, Fleet, GuidForm, Guids, Label, Message, Monotonic, Now, Prefix,
@@ -382,19 +381,5 @@ impl Node {
         if heard {
             self.show_services(place, effects);
         }
-    }
-}
-
-/// The status of every link, filled in with what the node knows.
-impl Links {
-    pub(super) fn statuses(&self, now: Monotonic) -> Vec<told::LinkStatus> {
-        let status = |attached: &Attached| told::LinkStatus {
-            name: attached.spec.name.clone(),
-            behind: attached.spec.export.behind.iter().copied().collect(),
-            durable: self.journaled,
-            services: attached.services.iter().copied().collect(),
-            ..attached.link.status(now)
-        };
-        self.all.iter().map(status).collect()
     }
 }

@@ -2,8 +2,9 @@
 
 use crate::cli::exit::Failure;
 use crate::cli::print_line;
-use aldis_services::sim::link;
+use aldis_services::sim::link::{self, SwarmReport};
 use serde_json::json;
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// Draw links from seeds, each with its own mixture of troubles, and check what must hold on all of them.
@@ -27,6 +28,32 @@ pub(super) struct SimLink {
 }
 
 impl SimLink {
+    /// The links of the swarm, shared out among the cores. Each is drawn from its own seed, so that who takes it does not matter.
+    fn swarm(&self) -> SwarmReport {
+        let shared = Mutex::new((0, SwarmReport::default()));
+        let lock = || shared.lock().unwrap_or_else(PoisonError::into_inner);
+        let work = || {
+            loop {
+                let number = {
+                    let (next, report) = &mut *lock();
+                    if report.hours >= self.hours {
+                        return;
+                    }
+                    *next += 1;
+                    *next - 1
+                };
+                let one = link::swarm_one(link::swarm_seed(self.seed, number));
+                lock().1.add(one);
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+                scope.spawn(work);
+            }
+        });
+        shared.into_inner().unwrap_or_else(PoisonError::into_inner).1
+    }
+
     pub(super) fn run(self) -> Result<(), Failure> {
         if !(self.hours.is_finite() && self.hours > 0.0) {
             return Err(Failure::Usage(format!("--hours {}: a number above 0", self.hours)));
@@ -34,7 +61,7 @@ impl SimLink {
         let start = Instant::now();
         let report = match self.only {
             Some(seed) => link::swarm_one(seed),
-            None => link::swarm(self.hours, self.seed),
+            None => self.swarm(),
         };
         let seconds = start.elapsed().as_secs_f64();
         if self.json {

@@ -1,6 +1,7 @@
 //! What the frames of a link go by.
 
 use crate::config::bridge::in_range;
+use crate::config::bus::{Bus, Mode};
 use crate::config::error::Fault;
 use crate::config::locator::Locator;
 use aldis_services::link::{CarrierConfig, CarrierId, MTU_MIN};
@@ -87,6 +88,13 @@ impl Carrier {
             round_trip: Duration::from_millis(self.round_trip_ms.into()),
             loss: f64::from(self.loss_percent) / 100.0,
         }
+    }
+
+    /// The Zenoh network of a carrier over Zenoh: a table of its own, because it is not the node's bus.
+    pub(crate) fn network(&self) -> Option<Bus> {
+        let mode = if self.listen_zenoh.is_empty() { Mode::Client } else { Mode::Peer };
+        let (listen, connect) = (self.listen_zenoh.clone(), self.connect.clone());
+        (self.kind == CarrierKind::Zenoh).then(|| Bus { mode, listen, connect, ..Bus::default() })
     }
 
     pub(super) fn check(&self) -> Result<(), Fault> {

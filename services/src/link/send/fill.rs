@@ -196,6 +196,7 @@ impl Link {
         while let Some((number, sample)) = self.states.next(now) {
             let Some(entry) = self.names.instances.get(&number) else { break };
             let wraps = before.is_some_and(|before| number <= before);
+            let used = (load.used, block.len());
             let short = self.states.short(number, entry, before, now).filter(|_| !wraps && fresh == 0);
             if let Some(short) = short {
                 if load.left() < 1 + block.len() + short.len() {
@@ -216,7 +217,8 @@ impl Link {
             }
             let Sample { origin, sequence, .. } = sample;
             load.carried.push(Carried::State { alias: number, origin, sequence });
-            self.states.sent(number, now);
+            let bytes = load.used - used.0 + block.len() - used.1;
+            self.states.sent(number, now, self.paths[index].airtime(bytes));
             self.counters.states_sent += 1;
         }
         if before.is_some() {

@@ -1,9 +1,10 @@
 //! What service 1 answers about links and what waits for them.
 
 use super::super::Node;
-use crate::link::{self};
+use super::{Attached, Links};
+use crate::link;
 use aldis_envelope::aldis::{self, link as told};
-use aldis_envelope::{Envelope, Now};
+use aldis_envelope::{Envelope, Monotonic, Now};
 use bytes::Bytes;
 
 /// At most so many commands are told in one answer.
@@ -62,5 +63,19 @@ impl Node {
             self.links.give(place, link::Event::Cancel(ticket));
         }
         ticket.is_some()
+    }
+}
+
+/// The status of every link, filled in with what the node knows.
+impl Links {
+    fn statuses(&self, now: Monotonic) -> Vec<told::LinkStatus> {
+        let status = |attached: &Attached| told::LinkStatus {
+            name: attached.spec.name.clone(),
+            behind: attached.spec.export.behind.iter().copied().collect(),
+            durable: self.journaled,
+            services: attached.services.iter().copied().collect(),
+            ..attached.link.status(now)
+        };
+        self.all.iter().map(status).collect()
     }
 }

@@ -109,10 +109,28 @@ struct Run {
 pub fn swarm(hours: f64, seed: u64) -> SwarmReport {
     let mut report = SwarmReport::default();
     while report.hours < hours {
-        let link = seed.wrapping_mul(1_000_003).wrapping_add(report.links);
-        one(link, &mut report);
+        one(swarm_seed(seed, report.links), &mut report);
     }
     report
+}
+
+/// The seed of a link of a swarm.
+pub fn swarm_seed(seed: u64, link: u64) -> u64 {
+    seed.wrapping_mul(1_000_003).wrapping_add(link)
+}
+
+impl SwarmReport {
+    /// Adds what other links came to.
+    pub fn add(&mut self, other: Self) {
+        let Self { hours, links, commands, crashes, options, violations } = other;
+        self.hours += hours;
+        self.links += links;
+        self.commands += commands;
+        self.crashes += crashes;
+        self.options.extend(options);
+        self.options.truncate(OPTIONS_TOLD);
+        self.violations.extend(violations);
+    }
 }
 
 /// Of how many links the options are told.

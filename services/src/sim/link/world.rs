@@ -94,6 +94,8 @@ pub struct LinkWorld {
     pub write_time: Duration,
     /// Whether each frame is noted with its time.
     pub trace: bool,
+    /// Frames that were sent, where they are to be kept: for those who would send them again, or change them.
+    pub captured: Option<Vec<Bytes>>,
     tickets: u64,
 }
 
@@ -109,6 +111,7 @@ impl LinkWorld {
             seen: Vec::new(),
             write_time: Duration::from_millis(2),
             trace: false,
+            captured: None,
             tickets: 0,
         }
     }

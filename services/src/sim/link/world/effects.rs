@@ -65,6 +65,9 @@ impl LinkWorld {
         let way = slot.ways.iter_mut().find(|(id, _)| *id == carrier);
         let arrivals = way.map(|(_, way)| way.send(now, frame.len())).unwrap_or_default();
         let frame = Bytes::from(frame);
+        if let Some(captured) = &mut self.captured {
+            captured.push(frame.clone());
+        }
         for at in arrivals {
             self.later(at, Happening::Frame(peer, carrier, frame.clone()));
         }
