@@ -22,6 +22,7 @@ mod replay;
 mod retained;
 mod route;
 mod run;
+mod simulate;
 mod subscribe;
 mod telemetry;
 mod within;
@@ -97,6 +98,8 @@ enum Command {
     Route(route::Route),
     /// Plan what a scenario asks for, offline: assignments, missions, a picture.
     Plan(plan::Plan),
+    /// Plan a scenario and let simulated vehicles do it, until all tasks are complete.
+    Simulate(simulate::Simulate),
     /// Measure this machine, side by side with the limit.
     Bench(bench::Bench),
 }
@@ -127,6 +130,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Assign(args) => args.run(),
         Command::Route(args) => args.run(),
         Command::Plan(args) => args.run(),
+        Command::Simulate(args) => args.run(),
         Command::Bench(args) => args.run(),
     };
     match done {

@@ -191,3 +191,6 @@ impl Offline {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -145,6 +145,10 @@ impl Life {
         match self.kind.ready(context.world) {
             Ok(()) => {
                 self.state.step(Trigger::Ready);
+                for doubt in self.kind.doubts() {
+                    let text = format!("task {}: {doubt}", self.id);
+                    context.post.status(ServiceStatusType::Warning, &[("TaskManager", text.as_str())]);
+                }
                 context.post.broadcast(&TaskInitialized { task_id: self.id });
             }
             Err(why) if self.told.as_ref() != Some(&why) => {
