@@ -63,7 +63,9 @@ impl Simulate {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let scenario = Scenario::read(&self.directory)?;
         let mut run = Run::default();
-        scenario.all().for_each(|object| drop(run.world.take(object)));
+        for object in scenario.all() {
+            run.world.take(object);
+        }
         let mut node = Offline::new(scenario.entity, services(&scenario)).map_err(Failure::Failed)?;
         node.play(scenario.told().into_iter().map(|object| Played { at: Duration::ZERO, object }).collect());
         let mut outcome = Outcome::default();

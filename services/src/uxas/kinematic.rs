@@ -117,7 +117,7 @@ impl Kinematic {
         };
         let Some(vehicle) = self.vehicle else { return };
         let actions = waypoint.vehicle_action_list.iter().filter_map(|action| action.object());
-        let loiter = actions.filter_map(|action| action.get::<LoiterAction>()).last().cloned();
+        let loiter = actions.filter_map(|action| action.get::<LoiterAction>()).next_back().cloned();
         if let (None, Some(loiter)) = (self.hold, loiter) {
             let circles = vehicle.medium == Medium::Air && loiter.loiter_type != LoiterType::Hover;
             let radius_m = f64::from(loiter.radius).max(vehicle.turn_radius_m);

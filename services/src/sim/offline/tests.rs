@@ -133,7 +133,7 @@ fn each_failure_is_answered_at_once_with_its_cause() {
         (request(&[1], &[100], "", 4), "OperatingRegion Id[4] not available"),
         (request(&[1], &[100], "", 8), "KeepOutArea Id[55] not available"),
         (request(&[1], &[], "", 9), "names no task"),
-        (request(&[1], &[100, 101], "|(p100 p101", 9), "character 11"),
+        (request(&[1], &[100, 101], "|(p100 p101", 9), "character 8: the id after `p`"),
         (request(&[1], &[100, 101], "|(p100 )", 9), "task 101 is in the request, but"),
         (request(&[1], &[102], "", 9), "keep-out zone 5: the nearest way out is at latitude 60.02"),
     ] {
@@ -203,17 +203,17 @@ fn shared(folder: &str) -> Option<Vec<Box<dyn Object>>> {
     files.sort();
     let mut objects: Vec<Box<dyn Object>> = Vec::new();
     for file in files {
-        let document = read_xml(&std::fs::read(file).unwrap()).unwrap();
+        let document = read_xml(std::fs::read_to_string(file).unwrap().as_bytes()).unwrap();
         objects.extend(document.objects.into_iter().map(|placed| placed.object));
     }
     // Zones before their region, tasks before the request.
-    let rank = |object: &Box<dyn Object>| {
+    let rank = |object: &dyn Object| {
         let name = object.type_info().name;
         ["Configuration", "State", "Zone", "Region", "Task", "Request"]
             .iter()
             .position(|end| name.ends_with(end))
     };
-    objects.sort_by_key(rank);
+    objects.sort_by_key(|object| rank(object.as_ref()));
     Some(objects)
 }
 

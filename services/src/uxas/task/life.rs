@@ -1,9 +1,10 @@
 //! The life of a task: from its message to its completion, each request for itself.
 //!
-//! `planning` answers requests: what sensors see, options and their costs, waypoints. `execution` follows the vehicles
-//! that were assigned: active, complete.
+//! `planning` answers requests: what sensors see, options and their costs. `implementing` makes waypoints of the option
+//! that was chosen. `execution` follows the vehicles that were assigned: active, complete.
 
 mod execution;
+mod implementing;
 mod planning;
 
 pub(crate) use planning::route_error;

@@ -6,12 +6,15 @@ use crate::uxas::task::composition;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Where a vehicle comes from; none is where it is at first.
-type From = Option<(i64, i64)>;
+type From = Option<Atom>;
+
+/// An option, by task and its own id.
+type Atom = (i64, i64);
 
 /// The ways of a request, by vehicle: those to an option, and those from it.
 struct Ways {
-    to: BTreeMap<(i64, (i64, i64)), BTreeMap<From, i64>>,
-    from: BTreeMap<(i64, (i64, i64)), BTreeMap<(i64, i64), i64>>,
+    to: BTreeMap<(i64, Atom), BTreeMap<From, i64>>,
+    from: BTreeMap<(i64, Atom), BTreeMap<Atom, i64>>,
 }
 
 impl Ways {
@@ -37,7 +40,7 @@ fn longer<K: Ord>(one: Option<&BTreeMap<K, i64>>, other: Option<&BTreeMap<K, i64
 }
 
 /// Whether a vehicle that does `one` in place of `other` is never later: neither when it is done, nor wherever it goes then.
-fn is_never_worse(ways: &Ways, vehicle: i64, one: ((i64, i64), i64), other: ((i64, i64), i64)) -> bool {
+fn is_never_worse(ways: &Ways, vehicle: i64, one: (Atom, i64), other: (Atom, i64)) -> bool {
     let ((one, one_ms), (other, other_ms)) = (one, other);
     let before = longer(ways.to.get(&(vehicle, one)), ways.to.get(&(vehicle, other)));
     let after = longer(ways.from.get(&(vehicle, one)), ways.from.get(&(vehicle, other)));

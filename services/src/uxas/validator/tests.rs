@@ -5,8 +5,9 @@ use crate::service::{Action, Outbox};
 use crate::uxas::machine::{Heard, Machine, Post};
 use crate::uxas::world::World;
 use aldis_envelope::lmcp::cmasi::{
-    AirVehicleConfiguration, AirVehicleState, AutomationRequest, AutomationResponse, KeepInZone, KeepOutZone,
-    MissionCommand, OperatingRegion, PointSearchTask,
+    AbstractZone, AirVehicleConfiguration, AirVehicleState, AutomationRequest, AutomationResponse,
+    EntityConfiguration, EntityState, KeepInZone, KeepOutZone, MissionCommand, OperatingRegion,
+    PointSearchTask,
 };
 use aldis_envelope::lmcp::impact::{ImpactAutomationRequest, ImpactAutomationResponse};
 use aldis_envelope::lmcp::uxtask::{
@@ -39,6 +40,12 @@ fn hear(validator: &mut Validator, ms: u64, object: Option<&dyn Object>) -> Vec<
     sent.collect()
 }
 
+fn point(id: i64) -> PointSearchTask {
+    let mut task = PointSearchTask::default();
+    task.base.base.task_id = id;
+    task
+}
+
 fn known() -> Vec<Box<dyn Object>> {
     let mut known: Vec<Box<dyn Object>> = Vec::new();
     for id in [400, 500] {
@@ -53,9 +60,7 @@ fn known() -> Vec<Box<dyn Object>> {
     known.push(Box::new(keep_out));
     known.push(Box::new(OperatingRegion { id: 3, keep_in_areas: vec![1], keep_out_areas: vec![2] }));
     for id in [1000, 1001] {
-        let mut task = PointSearchTask::default();
-        task.task_id = id;
-        known.push(Box::new(task));
+        known.push(Box::new(point(id)));
     }
     known
 }
@@ -145,9 +150,7 @@ fn requests_go_one_at_a_time_and_one_that_waits_for_its_tasks_holds_up_no_other(
     let told = sent.iter().find_map(|object| object.get::<AutomationResponse>()).unwrap();
     assert!(failure(told).unwrap().contains("no TaskPlanOptions of task [1000]"));
     // A task that is told again must be initialized again.
-    let mut task = PointSearchTask::default();
-    task.task_id = 1000;
-    hear(&mut validator, 6000, Some(&task));
+    hear(&mut validator, 6000, Some(&point(1000)));
     assert!(unique(&hear(&mut validator, 6001, Some(&request(&[1000])))).is_none());
     assert!(unique(&hear(&mut validator, 6002, Some(&TaskInitialized { task_id: 1000 }))).is_some());
 }
@@ -182,19 +185,13 @@ proptest! {
     ) {
         let mut world = World::default();
         for &id in &configured {
-            let mut entity = AirVehicleConfiguration::default();
-            entity.id = id;
-            world.take(&entity);
+            world.take(&EntityConfiguration { id, ..EntityConfiguration::default() });
         }
         for &id in &stated {
-            let mut state = AirVehicleState::default();
-            state.id = id;
-            world.take(&state);
+            world.take(&EntityState { id, ..EntityState::default() });
         }
         for &id in &zones {
-            let mut zone = KeepOutZone::default();
-            zone.zone_id = id;
-            world.take(&zone);
+            world.take(&AbstractZone { zone_id: id, ..AbstractZone::default() });
         }
         world.take(&OperatingRegion { id: 1, keep_in_areas: Vec::new(), keep_out_areas: wanted.iter().copied().collect() });
         let tasks: BTreeMap<i64, Box<dyn Object>> =

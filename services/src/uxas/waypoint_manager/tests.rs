@@ -90,11 +90,14 @@ fn a_boat_is_served_its_next_segment_when_it_is_in_it_and_not_twice_a_second() {
     assert_eq!(served(hear(&mut manager, 0.0, Some(&mission(plan(9))))), [(1, (1, 5))]);
     let mut state = SurfaceVehicleState::default();
     (state.id, state.current_waypoint) = (400, 4);
+    assert_eq!(served(hear(&mut manager, 0.3, Some(&state))), []);
+    assert_eq!(manager.deadline(), None, "the segment that it has goes on from there");
+    state.current_waypoint = 5;
     assert_eq!(served(hear(&mut manager, 0.5, Some(&state))), [], "too soon");
     assert_eq!(manager.deadline(), Some(Monotonic::since_start(Duration::from_secs(1))));
-    state.current_waypoint = 5;
+    state.current_waypoint = 6;
     assert_eq!(served(hear(&mut manager, 0.9, Some(&state))), []);
-    assert_eq!(served(hear(&mut manager, 1.0, None)), [(5, (4, 8))], "the newest counts");
+    assert_eq!(served(hear(&mut manager, 1.0, None)), [(6, (4, 8))], "the newest counts");
     assert_eq!(served(hear(&mut manager, 3.0, Some(&state))), [], "it has been served");
     let mut broken = plan(3);
     broken[1].next_waypoint = 77;
