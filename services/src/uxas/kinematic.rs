@@ -139,7 +139,7 @@ impl Kinematic {
         }
     }
 
-    fn advance(&mut self, mut seconds: f64) {
+    fn advance(&mut self, mut seconds: f64, post: &mut Post<'_>) {
         let Some(vehicle) = self.vehicle else { return };
         while seconds > 0.0 {
             let step = seconds.min(STEP_S);
@@ -161,11 +161,14 @@ impl Kinematic {
                     });
                     if is_over {
                         self.passed();
+                        self.tell(post);
                     }
                 }
                 None if self.target.is_some() => {
                     if motion.step(speed, vehicle.turn_radius_m, step) {
                         self.passed();
+                        // However short the way to the next waypoint is: whoever follows tasks must see each.
+                        self.tell(post);
                     }
                 }
                 None => motion.rest(),
@@ -228,7 +231,7 @@ impl Machine for Kinematic {
         let now = post.now().monotonic;
         let elapsed = self.last.map_or(0.0, |last| (now - last).as_secs_f64());
         self.last = Some(now);
-        self.advance(elapsed);
+        self.advance(elapsed, post);
         self.tell(post);
     }
 
