@@ -25,6 +25,7 @@ mod retained;
 mod route;
 mod run;
 mod sim;
+mod simulate;
 mod subscribe;
 mod telemetry;
 mod within;
@@ -106,6 +107,8 @@ enum Command {
     Queue(queue::QueueArgs),
     /// Simulate in virtual time.
     Sim(sim::Sim),
+    /// Plan a scenario and let simulated vehicles do it, until all tasks are complete.
+    Simulate(simulate::Simulate),
     /// Measure this machine, side by side with the limit.
     Bench(bench::Bench),
 }
@@ -139,6 +142,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Link(args) => args.run(),
         Command::Queue(args) => args.run(),
         Command::Sim(args) => args.run(),
+        Command::Simulate(args) => args.run(),
         Command::Bench(args) => args.run(),
     };
     match done {

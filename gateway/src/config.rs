@@ -20,6 +20,7 @@ mod schema;
 mod service;
 mod text;
 mod topic;
+mod uxas;
 
 pub(crate) use acl::acl;
 pub(crate) use allow::Allow;

@@ -83,3 +83,19 @@ fn a_simulated_fleet_is_recorded_and_judged() {
     assert_eq!(unknown.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&unknown.stderr).contains("stale-guard"));
 }
+
+#[test]
+fn a_scenario_is_planned_and_done_and_what_cannot_be_is_told() {
+    for name in ["channel", "rendezvous", "escort", "blockade"] {
+        let done = aldis(&["simulate", &format!("configs/scenarios/{name}"), "--seconds", "3600", "--json"]);
+        let told: serde_json::Value = serde_json::from_str(&stdout(&done)).unwrap();
+        assert!(done.status.success(), "{name}: {told}");
+        assert!(!told["tasks"].as_array().unwrap().is_empty(), "{name}: {told}");
+    }
+    let none = aldis(&["plan", "configs/scenarios/inside-keep-out", "--json"]);
+    assert_eq!(none.status.code(), Some(1));
+    let last = stdout(&none).lines().last().map(str::to_owned).unwrap();
+    let told: serde_json::Value = serde_json::from_str(&last).unwrap();
+    let why = told["errors"][0].as_str().unwrap();
+    assert!(why.contains("keep-out zone 2: the nearest way out is at latitude"), "{why}");
+}

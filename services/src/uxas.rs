@@ -17,8 +17,10 @@
 
 pub mod aggregator;
 pub mod builder;
+pub mod clearance;
 pub mod coordinator;
 pub mod ground;
+pub mod kinematic;
 pub mod machine;
 pub mod planner;
 pub mod region_state;
@@ -55,6 +57,8 @@ pub enum Core {
     Sensors,
     /// Serves a vehicle its mission.
     Waypoints(waypoint_manager::WaypointConfig),
+    /// Moves as a vehicle does.
+    Kinematic(kinematic::KinematicConfig),
 }
 
 impl Core {
@@ -70,6 +74,7 @@ impl Core {
             Self::Region(padding_m) => Box::new(Hosted::new(region_state::RegionState::new(*padding_m))),
             Self::Sensors => Box::new(Hosted::new(sensor_manager::SensorManager::default())),
             Self::Waypoints(config) => Box::new(Hosted::new(waypoint_manager::WaypointManager::new(*config))),
+            Self::Kinematic(config) => Box::new(Hosted::new(kinematic::Kinematic::new(*config))),
         }
     }
 
@@ -85,6 +90,7 @@ impl Core {
             Self::Region(_) => "OperatingRegionState",
             Self::Sensors => "SensorManager",
             Self::Waypoints(_) => "WaypointPlanManager",
+            Self::Kinematic(_) => "Vehicle",
         }
     }
 

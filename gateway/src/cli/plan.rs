@@ -90,7 +90,7 @@ impl Plan {
 }
 
 /// Lets a node work until it has answered a request.
-fn until_answered(node: &mut Offline) -> Vec<Overheard> {
+pub(super) fn until_answered(node: &mut Offline) -> Vec<Overheard> {
     let until = Monotonic::since_start(node.now().elapsed() + ANSWER_WITHIN);
     let mut heard = Vec::new();
     loop {

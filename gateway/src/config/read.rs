@@ -86,8 +86,29 @@ fn service(element: Element<'_>, index: usize) -> Result<Service, Mistake> {
             let track = typed::<Track>(table)?.check();
             Ok(Service::Track(track.map_err(|f| Mistake::Fault(f.below(&path)))?))
         }
-        other => Err(unknown_kind(&path, other, Service::KINDS)),
+        other => core(other, table, &path),
     }
+}
+
+/// A core service.
+fn core(kind: &str, table: Spanned<DeTable<'_>>, path: &str) -> Result<Service, Mistake> {
+    let service = match kind {
+        "automation-request-validator" => Service::AutomationRequestValidator(typed(table)?),
+        "task-manager" => Service::TaskManager(typed(table)?),
+        "sensor-manager" => Service::SensorManager(typed(table)?),
+        "route-planner-visibility" => Service::RoutePlannerVisibility(typed(table)?),
+        "route-aggregator" => Service::RouteAggregator(typed(table)?),
+        "assignment-tree-branch-bound" => Service::AssignmentTreeBranchBound(typed(table)?),
+        "plan-builder" => Service::PlanBuilder(typed(table)?),
+        "operating-region-state" => Service::OperatingRegionState(typed(table)?),
+        "waypoint-plan-manager" => Service::WaypointPlanManager(typed(table)?),
+        "simulated-vehicle" => Service::SimulatedVehicle(typed(table)?),
+        other => return Err(unknown_kind(path, other, Service::KINDS)),
+    };
+    if let Some(table) = service.core() {
+        table.check().map_err(|fault| Mistake::Fault(fault.below(path)))?;
+    }
+    Ok(service)
 }
 
 /// Takes the `kind` off a table.

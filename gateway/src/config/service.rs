@@ -3,6 +3,7 @@
 use super::bridge::in_range;
 use super::error::Fault;
 use super::schema;
+use super::uxas::{self, CoreTable};
 use aldis_envelope::{EntityId, ServiceId, Source};
 use aldis_services::track::TrackConfig;
 use schemars::JsonSchema;
@@ -17,16 +18,66 @@ pub(crate) const SERVICE_MIN: u32 = 100;
 pub(crate) enum Service {
     /// A simple moving vehicle that sends telemetry.
     Track(Track),
+    /// Checks automation requests, feeds them in one at a time, answers them.
+    AutomationRequestValidator(uxas::AutomationRequestValidator),
+    /// Keeps the tasks.
+    TaskManager(uxas::TaskManager),
+    /// Knows what sensors see.
+    SensorManager(uxas::SensorManager),
+    /// Finds ways around zones.
+    RoutePlannerVisibility(uxas::RoutePlannerVisibility),
+    /// Collects routes, and the costs between tasks.
+    RouteAggregator(uxas::RouteAggregator),
+    /// Assigns tasks to vehicles.
+    AssignmentTreeBranchBound(uxas::AssignmentTreeBranchBound),
+    /// Builds missions from assignments.
+    PlanBuilder(uxas::PlanBuilder),
+    /// Keeps operating region 0.
+    OperatingRegionState(uxas::OperatingRegionState),
+    /// Serves a vehicle its mission in segments.
+    WaypointPlanManager(uxas::WaypointPlanManager),
+    /// A simulated vehicle that follows its missions.
+    SimulatedVehicle(uxas::SimulatedVehicle),
 }
 
 impl Service {
     /// What may stand as `kind`.
-    pub(crate) const KINDS: &[&str] = &["track"];
+    pub(crate) const KINDS: &[&str] = &[
+        "track",
+        "automation-request-validator",
+        "task-manager",
+        "sensor-manager",
+        "route-planner-visibility",
+        "route-aggregator",
+        "assignment-tree-branch-bound",
+        "plan-builder",
+        "operating-region-state",
+        "waypoint-plan-manager",
+        "simulated-vehicle",
+    ];
 
-    /// The service id, unique on its entity.
+    /// The table of a core service; none where it is something else.
+    pub(crate) fn core(&self) -> Option<&dyn CoreTable> {
+        Some(match self {
+            Self::Track(_) => return None,
+            Self::AutomationRequestValidator(table) => table,
+            Self::TaskManager(table) => table,
+            Self::SensorManager(table) => table,
+            Self::RoutePlannerVisibility(table) => table,
+            Self::RouteAggregator(table) => table,
+            Self::AssignmentTreeBranchBound(table) => table,
+            Self::PlanBuilder(table) => table,
+            Self::OperatingRegionState(table) => table,
+            Self::WaypointPlanManager(table) => table,
+            Self::SimulatedVehicle(table) => table,
+        })
+    }
+
+    /// The service id, unique on its entity. A configuration that was read has one.
     pub(crate) fn service(&self) -> ServiceId {
         match self {
             Self::Track(track) => track.service,
+            core => core.core().and_then(CoreTable::service).unwrap_or(ServiceId::NODE),
         }
     }
 
@@ -34,6 +85,7 @@ impl Service {
     pub(crate) fn entity(&self) -> Option<EntityId> {
         match self {
             Self::Track(track) => track.entity,
+            core => core.core().and_then(CoreTable::entity),
         }
     }
 }

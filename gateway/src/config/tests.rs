@@ -264,7 +264,7 @@ fn defaults() {
     assert_eq!((bridge.message_bytes_max, bridge.queue_messages_max), (16 << 20, 8192));
     assert_eq!(bridge.stall_timeout(), Duration::from_secs(5));
     assert_eq!((&bridge.import, &bridge.export), (&vec![Prefix::all()], &vec![Prefix::all()]));
-    let Service::Track(track) = &config.services[0];
+    let Service::Track(track) = &config.services[0] else { panic!("a track was written") };
     assert_eq!((track.heading_deg, track.speed_m_per_s, track.rate_hz), (0.0, 0.0, 1.0));
     assert_eq!(track.source(config.entities.own()).to_string(), "eid400sid100");
     assert_eq!(track.motion(config.entities.own()).latitude_deg, 59.0);
@@ -299,4 +299,31 @@ fn files_are_looked_for_beside_the_configuration() {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
     let config = Config::load(&directory.join("router.toml")).unwrap();
     assert_eq!(config.bus.dictionary_file, Some(directory.join("router-users.txt")));
+}
+
+#[test]
+fn core_services_are_named_with_their_keys_and_checked() {
+    let core = "[[service]]\nkind = \"waypoint-plan-manager\"\nservice = 110\nnumber_waypoints_to_serve = 15\n\
+                [[service]]\nkind = \"assignment-tree-branch-bound\"\nservice = 111\ncost_function = \"CUMULATIVE\"\n\
+                [[service]]\nkind = \"task-manager\"\nservice = 112\noptions = [{ task_id = 7, name = \"a\", value = \"b\" }]\n";
+    let config = Config::parse("", &format!("{TOP}{core}")).unwrap();
+    let cores: Vec<_> =
+        config.services.iter().map(|one| one.core().unwrap().core(config.entities.own())).collect();
+    assert_eq!(cores[0].name(), "WaypointPlanManager");
+    assert!(
+        format!("{:?}", cores[0]).contains("vehicle: 400, number_waypoints_to_serve: 15"),
+        "{:?}",
+        cores[0]
+    );
+    assert!(format!("{:?}", cores[1]).contains("Cumulative"));
+    assert_eq!(config.services[2].service().get(), 112);
+    for (table, what) in [
+        ("[[service]]\nkind = \"plan-builder\"\n", "has no `service`"),
+        ("[[service]]\nkind = \"plan-builder\"\nservice = 7\n", "is not for a configuration"),
+        ("[[service]]\nkind = \"plan-bilder\"\nservice = 107\n", "unknown kind"),
+        ("[[service]]\nkind = \"plan-builder\"\nservice = 107\nturn = 1\n", "turn"),
+    ] {
+        let error = Config::parse("", &format!("{TOP}{table}")).unwrap_err();
+        assert!(drawn(&error).contains(what), "{}", drawn(&error));
+    }
 }

@@ -11,6 +11,7 @@ use aldis_envelope::{EntityId, Guids, Source};
 use aldis_services::LinkId;
 use aldis_services::link::{CarrierId, LinkKey};
 use aldis_services::registry::{self, Kind};
+use aldis_services::uxas::Core;
 use aldis_services::{BridgeSpec, NodeConfig, ServiceSpec};
 
 /// What the shell opens for a node.
@@ -137,8 +138,18 @@ pub(crate) fn node_config(config: &Config) -> NodeConfig {
 }
 
 fn configured(own: EntityId, service: &config::Service, guids: &Guids) -> ServiceSpec {
-    let config::Service::Track(track) = service;
-    registry::service(track.source(own), "track", Kind::Track(track.motion(own)), guids)
+    let source = Source::new(service.entity().unwrap_or(own), service.service());
+    match service {
+        config::Service::Track(track) => {
+            registry::service(track.source(own), "track", Kind::Track(track.motion(own)), guids)
+        }
+        core => {
+            // All that is no track is a core service.
+            let core = core.core().map(|table| table.core(source.entity));
+            let name = core.as_ref().map_or("none", Core::name);
+            registry::service(source, name, core.map_or(Kind::Node, Kind::Core), guids)
+        }
+    }
 }
 
 fn bridge_spec(own: EntityId, bridge: &config::Bridge) -> BridgeSpec {

@@ -193,3 +193,6 @@ impl Offline {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -17,6 +17,8 @@
 
 mod collect;
 mod needed;
+#[cfg(test)]
+mod tests;
 
 use super::ground::Ground;
 use super::machine::{FAILED_KEY, Heard, Machine, Post, REQUEST_KEY};

@@ -11,7 +11,7 @@ pub type Point = (f64, f64);
 /// A plane around a place.
 pub enum Ground {
     /// Distances and directions from the origin are true.
-    True(Plane),
+    True(Box<Plane>),
     /// The reference's: for comparisons.
     Flat(FlatEarth),
 }
@@ -22,7 +22,7 @@ impl Ground {
         let (latitude_deg, longitude_deg) = (origin.latitude, origin.longitude);
         match compat {
             true => Self::Flat(FlatEarth::new(latitude_deg, longitude_deg)),
-            false => Self::True(Plane::new(Place { latitude_deg, longitude_deg })),
+            false => Self::True(Box::new(Plane::new(Place { latitude_deg, longitude_deg }))),
         }
     }
 

@@ -151,6 +151,11 @@ pub trait Kind: Send {
         Ok(())
     }
 
+    /// What about it is probably not meant so, in words.
+    fn doubts(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// What it wants to know of sensors.
     fn looks(&self, _view: &View<'_>) -> Vec<Look> {
         Vec::new()

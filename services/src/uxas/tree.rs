@@ -13,6 +13,8 @@
 //! sooner where its plan is proven best), `cost_function` (`MINMAX`, `CUMULATIVE`), `precedence` (`choice`, `temporal`),
 //! `leave_out` (false: tasks that the relationships do not name are a mistake).
 
+mod dominated;
+
 use super::machine::{FAILED_KEY, Heard, Machine, Post, REQUEST_KEY};
 use crate::plan::algebra::Unnamed;
 use crate::plan::assignment::{
@@ -128,10 +130,16 @@ impl Tree {
         if !is_whole || std::mem::replace(&mut waiting.searching, true) {
             return;
         }
-        let request = waiting.request(config);
+        let mut request = waiting.request(config);
         let nodes = u64::try_from(config.number_nodes_maximum).ok().filter(|&nodes| nodes > 0);
         let effort = Effort { nodes: nodes.unwrap_or(Effort::default().nodes), ..Effort::default() };
-        post.job(number as u64, Box::new(move || Box::new(assign(&request, effort))));
+        post.job(
+            number as u64,
+            Box::new(move || {
+                dominated::without_dominated(&mut request);
+                Box::new(assign(&request, effort))
+            }),
+        );
     }
 
     fn found(&mut self, number: i64, plan: &Plan, post: &mut Post<'_>) {

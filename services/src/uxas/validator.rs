@@ -15,6 +15,8 @@
 
 mod check;
 mod pending;
+#[cfg(test)]
+mod tests;
 
 use super::machine::{FAILED_KEY, Heard, Machine, Post, REQUEST_KEY, pair};
 use super::task::life::TASK_KEY;

@@ -12,6 +12,8 @@
 //! `loop_back_to_first_task`, `set_last_waypoint_speed_to_0` (all false), `turn_type` (TurnShort), `gimbal_payload` (none).
 
 mod segments;
+#[cfg(test)]
+mod tests;
 
 use super::machine::{Heard, Machine, Post};
 use super::task::stay;
@@ -118,9 +120,8 @@ impl WaypointManager {
         self.segments = segments(&plan, serve, overlap);
         self.mission = mission.clone();
         self.served = None;
-        // The first waypoint is where the vehicle comes from: it heads for the second.
-        let first = self.segments.first().and_then(|segment| segment.get(1).or(segment.first()));
-        self.due = first.map(|waypoint| (0, waypoint.number));
+        // The reference begins with the second waypoint, and so may miss a task or a turn.
+        self.due = Some((0, mission.first_waypoint));
         self.serve(post);
     }
 

@@ -11,9 +11,9 @@ use aldis_envelope::lmcp::route::RouteConstraints;
 /// Cost in milliseconds, and waypoints.
 type Routed = Result<(i64, Vec<Ref<Waypoint>>), String>;
 
-/// How far an arc goes from one waypoint to the next at the most, in radians: the vehicle then leaves it by a thousandth of its
-/// radius.
-const ARC_STEP_RAD: f64 = 0.1;
+/// How far an arc goes from one waypoint to the next, in radians, at least and at most: beyond that its corners would lie far
+/// from it.
+const ARC_STEP_RAD: (f64, f64) = (0.1, 0.25);
 
 impl Region {
     /// The route that is asked for.
@@ -81,21 +81,12 @@ impl Region {
             Err(Ok(text)) => return Err(text),
             Err(Err(why)) => return Err(in_degrees(&why, &self.ground)),
         };
-        let mut points = Vec::new();
+        let mut points: Vec<Point> = Vec::new();
         for piece in &route.pieces {
-            let steps = match *piece {
-                Piece::Line { .. } => 1.0,
-                Piece::Arc { radius_m, sweep_rad, .. } => {
-                    let step = ARC_STEP_RAD.max(separation / radius_m);
-                    (sweep_rad.abs() / step).ceil().max(1.0)
-                }
-            };
-            points.extend((1..=steps as usize).map(|step| piece.place(step as f64 / steps)));
+            points.extend(corners(piece, separation));
         }
+        points.push(goal.at);
         points.dedup_by(|a, b| far(*a, *b) < 0.01);
-        if points.is_empty() {
-            points.push(goal.at);
-        }
         Ok((self.time_ms(route.length_m)?, self.waypoints(&points)))
     }
 
@@ -114,6 +105,19 @@ impl Region {
         };
         points.iter().zip(1..).map(waypoint).collect()
     }
+}
+
+/// The corners of a piece of way. Those of an arc lie around it, so that who turns within each corner is on the arc.
+fn corners(piece: &Piece, separation_m: f64) -> Vec<Point> {
+    let Piece::Arc { center, radius_m, from_rad, sweep_rad } = *piece else { return vec![piece.place(1.0)] };
+    let step = (separation_m / radius_m).clamp(ARC_STEP_RAD.0, ARC_STEP_RAD.1);
+    let count = (sweep_rad.abs() / step).ceil().max(1.0);
+    let half = sweep_rad / count / 2.0;
+    let corner = |at: u32| {
+        let (sine, cosine) = (from_rad + half * (2.0 * f64::from(at) + 1.0)).sin_cos();
+        (center.0 + radius_m / half.cos() * cosine, center.1 + radius_m / half.cos() * sine)
+    };
+    (0..count as u32).map(corner).collect()
 }
 
 /// The length as the reference counts it: each piece in whole metres.

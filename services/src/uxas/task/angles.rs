@@ -9,6 +9,9 @@ const STEP_DEG: f64 = 22.5;
 /// The elevation where no wedge names one, in degrees.
 const ELEVATION_DEG: f64 = -60.0;
 
+/// Elevations above this, in degrees, look up.
+const LOOKS_UP_DEG: f64 = 10.0;
+
 fn samples(middle_deg: f64, extent_deg: f64) -> impl Iterator<Item = f64> {
     let first = middle_deg - extent_deg.abs() / 2.0;
     let count = (extent_deg.abs() / STEP_DEG).floor() as u32;
@@ -25,20 +28,12 @@ pub(super) fn azimuths(wedges: &[Ref<Wedge>], default: &[f64]) -> Vec<f64> {
     wedges.into_iter().flat_map(of).collect()
 }
 
-/// The elevations of wedges, in degrees, each once.
-///
-/// # Errors
-/// A wedge that looks up: the reference takes it for a look at the horizon without a word.
-pub(super) fn elevations(wedges: &[Ref<Wedge>]) -> Result<Vec<f64>, String> {
+/// The elevations of wedges, in degrees, each once. A look up is taken for one down, as old task files measure it.
+pub(super) fn elevations(wedges: &[Ref<Wedge>]) -> Vec<f64> {
     let mut found = Vec::new();
     for wedge in wedges.iter().filter_map(|wedge| wedge.get()) {
         let (middle, extent) = (f64::from(wedge.vertical_centerline), f64::from(wedge.vertical_extent));
-        if middle > 10.0 {
-            return Err(format!(
-                "a view angle has the elevation {middle}°, which looks up: negative is down, write {}",
-                -middle
-            ));
-        }
+        let middle = if middle > LOOKS_UP_DEG { -middle } else { middle };
         found.extend(samples(middle, extent).map(|elevation| elevation.clamp(-90.0, 10.0)));
     }
     if found.is_empty() {
@@ -46,7 +41,21 @@ pub(super) fn elevations(wedges: &[Ref<Wedge>]) -> Result<Vec<f64>, String> {
     }
     found.sort_by(f64::total_cmp);
     found.dedup();
-    Ok(found)
+    found
+}
+
+/// What is to be told of wedges that look up: the reference takes them for looks at the horizon without a word.
+pub(super) fn doubts(wedges: &[Ref<Wedge>]) -> Vec<String> {
+    let wedges = wedges.iter().filter_map(|wedge| wedge.get());
+    let up = wedges.filter(|wedge| f64::from(wedge.vertical_centerline) > LOOKS_UP_DEG);
+    let doubt = |wedge: &Wedge| {
+        let up = wedge.vertical_centerline;
+        format!(
+            "a view angle has the elevation {up}°, which looks up: it is taken for {}°, negative is down",
+            -up
+        )
+    };
+    up.map(doubt).collect()
 }
 
 /// Sixteen directions around.
@@ -76,9 +85,10 @@ mod tests {
     }
 
     #[test]
-    fn a_look_up_is_refused_with_its_cure() {
-        assert_eq!(elevations(&[wedge(0.0, 0.0, -60.0), wedge(9.0, 0.0, -60.0)]), Ok(vec![-60.0]));
-        assert_eq!(elevations(&[]), Ok(vec![-60.0]));
-        assert!(elevations(&[wedge(0.0, 0.0, 60.0)]).unwrap_err().contains("write -60"));
+    fn a_look_up_is_one_down_with_a_word() {
+        assert_eq!(elevations(&[wedge(0.0, 0.0, -60.0), wedge(9.0, 0.0, 60.0)]), [-60.0]);
+        assert_eq!(elevations(&[]), [-60.0]);
+        assert!(doubts(&[wedge(0.0, 0.0, 60.0)])[0].contains("taken for -60°"));
+        assert!(doubts(&[wedge(0.0, 0.0, -60.0)]).is_empty());
     }
 }

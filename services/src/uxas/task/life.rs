@@ -1,9 +1,10 @@
 //! The life of a task: from its message to its completion, each request for itself.
 //!
-//! `planning` answers requests: what sensors see, options and their costs, waypoints. `execution` follows the vehicles
-//! that were assigned: active, complete.
+//! `planning` answers requests: what sensors see, options and their costs. `implementing` makes waypoints of the option
+//! that was chosen. `execution` follows the vehicles that were assigned: active, complete.
 
 mod execution;
+mod implementing;
 mod planning;
 
 pub(crate) use planning::route_error;
@@ -145,6 +146,10 @@ impl Life {
         match self.kind.ready(context.world) {
             Ok(()) => {
                 self.state.step(Trigger::Ready);
+                for doubt in self.kind.doubts() {
+                    let text = format!("task {}: {doubt}", self.id);
+                    context.post.status(ServiceStatusType::Warning, &[("TaskManager", text.as_str())]);
+                }
                 context.post.broadcast(&TaskInitialized { task_id: self.id });
             }
             Err(why) if self.told.as_ref() != Some(&why) => {

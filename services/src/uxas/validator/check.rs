@@ -63,16 +63,16 @@ fn entities(
     let planned: BTreeSet<i64> =
         request.planning_states.iter().filter_map(|state| state.get()).map(|state| state.entity_id).collect();
     let has_state = |id: &i64| world.states.contains_key(id) || planned.contains(id);
+    let any_state = !world.states.is_empty() || !planned.is_empty();
     if world.configurations.is_empty() {
         reasons.add("No EntityConfigurations available.");
     }
-    if world.states.is_empty() && planned.is_empty() {
+    if !any_state {
         reasons.add("No EntityStates available.");
     }
     if asked.entity_list.is_empty() {
-        let (configured, stated) =
-            (!world.configurations.is_empty(), !world.states.is_empty() || !planned.is_empty());
-        if configured && stated && !world.configurations.keys().any(has_state) {
+        let configured = !world.configurations.is_empty();
+        if configured && any_state && !world.configurations.keys().any(has_state) {
             reasons.add("No EntityStates that match EntityConfigurations are available.");
         }
         return;
@@ -81,7 +81,7 @@ fn entities(
         if !world.configurations.is_empty() && !world.configurations.contains_key(id) {
             reasons.add(format!("EntityConfiguration for Entity Id[{id}] not available."));
         }
-        if !(world.states.is_empty() && planned.is_empty()) && !has_state(id) {
+        if any_state && !has_state(id) {
             reasons.add(format!("EntityState for Entity Id[{id}] not available."));
         }
     }

@@ -27,14 +27,11 @@ pub(super) fn looks(search: &SearchTask, view: &View<'_>, elevations_deg: &[f64]
     all.flat_map(|vehicle| elevations_deg.iter().map(move |&elevation| look(vehicle, elevation))).collect()
 }
 
-/// What a vehicle's sensors see at an elevation in degrees.
-pub(super) fn footprint<'a>(seen: &'a Seen, vehicle: i64, elevation_deg: f64) -> Option<&'a SensorFootprint> {
+/// What a vehicle's sensors see at the elevation, in degrees, that they come nearest to.
+pub(super) fn footprint(seen: &Seen, vehicle: i64, elevation_deg: f64) -> Option<&SensorFootprint> {
     let own = seen.footprints.iter().filter(|footprint| footprint.vehicle_id == vehicle);
-    // A sensor of fixed width has no elevation.
-    let fits = |found: &&SensorFootprint| {
-        found.gimbal_id == 0 || (f64::from(found.gimbal_elevation) - elevation_deg).abs() < 0.5
-    };
-    own.into_iter().find(fits)
+    let miss = |found: &&SensorFootprint| (f64::from(found.gimbal_elevation) - elevation_deg).abs();
+    own.min_by(|a, b| miss(a).total_cmp(&miss(b)))
 }
 
 /// The error where no vehicle sees anything.
@@ -87,15 +84,19 @@ pub(super) fn on_plane(
 }
 
 impl Kind for AreaSearchTask {
+    fn doubts(&self) -> Vec<String> {
+        angles::doubts(&self.view_angle_list)
+    }
+
     fn looks(&self, view: &View<'_>) -> Vec<Look> {
-        looks(self, view, &angles::elevations(&self.view_angle_list).unwrap_or_default())
+        looks(self, view, &angles::elevations(&self.view_angle_list))
     }
 
     fn offer(&self, view: &View<'_>, seen: &Seen) -> Result<Offer, String> {
         let (ground, corners) = on_plane(&self.search_area, view)?;
         let mut choices = Vec::new();
         for vehicle in &view.vehicles {
-            for elevation in angles::elevations(&self.view_angle_list)? {
+            for elevation in angles::elevations(&self.view_angle_list) {
                 let Some(footprint) = footprint(seen, vehicle.id, elevation) else { continue };
                 for heading in angles::azimuths(&self.view_angle_list, &angles::around()) {
                     let sweep = Sweep { middle_alone: view.compat, ..Sweep::of(footprint, heading) };

@@ -32,7 +32,7 @@ impl Line<'_> {
         let reversed: Vec<Point> = line.iter().rev().copied().collect();
         let (mut choices, mut parts) = (Vec::new(), Vec::new());
         for group in view.groups() {
-            for elevation in angles::elevations(self.wedges)? {
+            for elevation in angles::elevations(self.wedges) {
                 for azimuth in angles::azimuths(self.wedges, &[AZIMUTH_DEG]) {
                     let mut pair = Vec::new();
                     let ways = [&line, &reversed];
@@ -116,6 +116,10 @@ fn places(points: &[Ref<Location3D>]) -> Result<Vec<Location3D>, String> {
 }
 
 impl Kind for LineSearchTask {
+    fn doubts(&self) -> Vec<String> {
+        angles::doubts(&self.view_angle_list)
+    }
+
     fn ready(&self, _: &World) -> Result<(), String> {
         places(&self.point_list).map(drop)
     }
@@ -135,6 +139,10 @@ fn impact_line(task: &ImpactLineSearchTask, world: &World) -> Result<Vec<Locatio
 }
 
 impl Kind for ImpactLineSearchTask {
+    fn doubts(&self) -> Vec<String> {
+        angles::doubts(&self.view_angle_list)
+    }
+
     fn ready(&self, world: &World) -> Result<(), String> {
         impact_line(self, world).map(drop)
     }

@@ -57,7 +57,7 @@ fn pattern_sectors(task: &PatternSearchTask, spacing_m: f64) -> Vec<Point> {
     let step = (spacing_m / extent).to_degrees().clamp(5.0, 90.0);
     let count = (180.0 / step).ceil() as usize;
     let spoke = |at: usize| {
-        let heading = at as f64 * step + if at % 2 == 0 { 0.0 } else { 180.0 };
+        let heading = at as f64 * step + if at.is_multiple_of(2) { 0.0 } else { 180.0 };
         [ahead((0.0, 0.0), heading + 180.0, extent), ahead((0.0, 0.0), heading, extent)]
     };
     (0..count).flat_map(spoke).collect()

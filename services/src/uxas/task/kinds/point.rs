@@ -54,8 +54,8 @@ pub(super) fn from_all_sides(
 /// The payload by which a vehicle stares: its last gimbal.
 pub(super) fn gimbal(world: &World, vehicle: i64) -> Option<i64> {
     let payloads = &world.configuration(vehicle)?.payload_configuration_list;
-    let gimbals = payloads.iter().filter_map(|payload| payload.object()?.get::<GimbalConfiguration>());
-    gimbals.last().map(|gimbal| gimbal.payload_id)
+    let mut gimbals = payloads.iter().filter_map(|payload| payload.object()?.get::<GimbalConfiguration>());
+    gimbals.next_back().map(|gimbal| gimbal.payload_id)
 }
 
 /// Has a vehicle's gimbal stare at a place, from a waypoint on.

@@ -5,9 +5,7 @@ use super::super::{View, waypoints};
 use super::{Context, Life, Sent};
 use crate::uxas::vehicle::Vehicle;
 use aldis_envelope::lmcp::Ref;
-use aldis_envelope::lmcp::cmasi::{
-    AutomationResponse, CommandStatusType, EntityState, Location3D, MissionCommand, Waypoint,
-};
+use aldis_envelope::lmcp::cmasi::{AutomationResponse, EntityState, Location3D, MissionCommand, Waypoint};
 use aldis_envelope::lmcp::route::{RouteConstraints, RoutePlanResponse};
 use aldis_envelope::lmcp::uxtask::{TaskActive, TaskComplete};
 
@@ -173,7 +171,6 @@ impl Life {
         let mut mission = MissionCommand { first_waypoint: first, ..MissionCommand::default() };
         mission.vehicle_id = id;
         mission.command_id = response.response_id;
-        mission.status = CommandStatusType::Approved;
         mission.waypoint_list = list.into_iter().map(Ref::new).collect();
         context.post.broadcast(&mission);
         true
