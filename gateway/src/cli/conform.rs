@@ -64,6 +64,8 @@ struct Watching {
     monitor: Arc<Mutex<Option<Monitor>>>,
     decoder: Decoder,
     judges_from: Option<Monotonic>,
+    /// Whether it has been told that what comes is judged.
+    judges: bool,
     written: BTreeMap<Source, BTreeSet<(String, KeyHash)>>,
     instances: usize,
     tell: mpsc::Sender<Told>,
@@ -72,6 +74,7 @@ struct Watching {
 /// What the desk and the signals tell the command.
 enum Told {
     Joined,
+    Judges,
     Stop,
 }
 
@@ -129,8 +132,16 @@ impl Desk for Watching {
             Input::HistoryComplete(_) => self.judges_from = Some(now.monotonic + SETTLING),
             Input::Message(envelope) if envelope.message.call.is_none() => self.message(now, envelope),
             Input::Token(writer, false) => self.vanished(now, writer),
+            Input::Deadline if !self.judges && self.judges_from.is_some_and(|from| from <= now.monotonic) => {
+                self.judges = true;
+                let _ = self.tell.send(Told::Judges);
+            }
             _ => {}
         }
+    }
+
+    fn next_deadline(&self) -> Option<Monotonic> {
+        self.judges_from.filter(|_| !self.judges)
     }
 }
 
@@ -159,6 +170,7 @@ impl Conform {
             monitor: shared.clone(),
             decoder: Decoder::new([]),
             judges_from: None,
+            judges: false,
             written: BTreeMap::new(),
             instances: 0,
             tell: tell.clone(),
@@ -173,7 +185,13 @@ impl Conform {
             })?;
             let wait = self.span.map_or(Duration::MAX, |span| span.0);
             // A session that comes back ends nothing.
-            while let Ok(Told::Joined) = told.recv_timeout(wait.saturating_sub(started.elapsed())) {}
+            while let Ok(news @ (Told::Joined | Told::Judges)) =
+                told.recv_timeout(wait.saturating_sub(started.elapsed()))
+            {
+                if matches!(news, Told::Judges) {
+                    eprintln!("aldis: what the fleet retains is known; what comes from now on is judged");
+                }
+            }
         }
         member.leave()?;
         joined.map_err(|_| self.join.unreachable())?;
