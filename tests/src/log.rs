@@ -16,7 +16,7 @@ struct State {
 
 impl Log {
     /// Follows a stream until its end, on a thread of its own.
-    pub(crate) fn follow(stream: impl Read + Send + 'static) -> Self {
+    pub fn follow(stream: impl Read + Send + 'static) -> Self {
         let log = Self::default();
         let writer = log.clone();
         std::thread::spawn(move || {

@@ -12,12 +12,13 @@ use super::exit::Failure;
 use super::member::{Desk, Join, Member};
 use super::print_line;
 use aldis_envelope::umaa::{Command, CommandState};
-use aldis_envelope::{EntityId, Guid, Guids, Now, Prefix, ServiceId, Source};
+use aldis_envelope::{EntityId, Guid, Guids, Monotonic, Now, Prefix, ServiceId, Source};
 use aldis_services::umaa::command::{Consumer, ConsumerError, Outcome, Told};
 use aldis_services::{Input, Outbox};
 use serde_json::{Value, json};
 use std::str::FromStr;
 use std::sync::mpsc;
+use std::time::Duration;
 
 /// Asks a running `aldis allocate` to give its resource back.
 const RELEASE: &str = "aldis.Release";
@@ -69,8 +70,11 @@ enum News {
 struct OneCommand<C: Command> {
     consumer: Consumer<C>,
     destination: Guid,
-    command: Option<C>,
+    command: C,
     session: Option<Guid>,
+    /// How long after each time that it is executed it is asked for again.
+    renew_after: Option<Duration>,
+    renew_at: Option<Monotonic>,
     tell: mpsc::Sender<News>,
 }
 
@@ -78,9 +82,9 @@ impl<C: Command> OneCommand<C> {
     fn news(&mut self, now: Now, input: &Input<'_>, out: &mut Outbox) {
         let told = self.consumer.handle(now, input, out);
         if let Input::HistoryComplete(_) = input
-            && let Some(command) = self.command.take()
+            && self.session.is_none()
         {
-            let started = self.consumer.start(now, self.destination, command, out);
+            let started = self.consumer.start(now, self.destination, self.command.clone(), out);
             self.session = started.as_ref().ok().copied();
             // The command line no longer listens where it has been cut off; so below.
             let _ = self.tell.send(started.map_or_else(News::NotAsked, |_| News::Asked));
@@ -88,12 +92,30 @@ impl<C: Command> OneCommand<C> {
         for told in told {
             let news = match told {
                 Told::State { session, state, text, .. } if self.session == Some(session) => {
+                    let is_executed = state == CommandState::Executing;
+                    self.renew_at =
+                        self.renew_after.filter(|_| is_executed).map(|after| now.monotonic + after);
                     News::State(state, text)
                 }
-                Told::Ended { session, outcome } if self.session == Some(session) => News::Ended(outcome),
+                Told::Ended { session, outcome } if self.session == Some(session) => {
+                    self.renew_at = None;
+                    News::Ended(outcome)
+                }
                 _ => continue,
             };
             let _ = self.tell.send(news);
+        }
+        self.renew(now, out);
+    }
+
+    /// Asks again for the same, by an update of the session (ICD 4.1.4.2, 5.1.3).
+    fn renew(&mut self, now: Now, out: &mut Outbox) {
+        if self.renew_at.is_some_and(|at| at <= now.monotonic)
+            && let Some(session) = self.session
+        {
+            self.renew_at = None;
+            // Where it is not open any more, its end is about to be told.
+            let _ = self.consumer.update(now, session, self.command.clone(), out);
         }
     }
 }
@@ -115,23 +137,25 @@ impl<C: Command> Desk for OneCommand<C> {
         self.news(now, &input, out);
     }
 
-    fn next_deadline(&self) -> Option<aldis_envelope::Monotonic> {
-        self.consumer.next_deadline()
+    fn next_deadline(&self) -> Option<Monotonic> {
+        [self.consumer.next_deadline(), self.renew_at].into_iter().flatten().min()
     }
 }
 
-/// Joins the fleet as a consumer with one command.
+/// Joins the fleet as a consumer with one command, and asks for it again so long after each time that it is executed.
 fn send<C: Command>(
     join: &Join,
     service: ServiceId,
     destination: Guid,
     command: C,
+    renew_after: Option<Duration>,
 ) -> Result<(Member, mpsc::Receiver<News>), Failure> {
     let source = Source::new(join.own()?, service);
     let consumer = Consumer::new(source, join.guids()?, Default::default());
     let prefixes: Vec<Prefix> = consumer.subscriptions();
     let (tell, told) = mpsc::channel();
-    let desk = OneCommand { consumer, destination, command: Some(command), session: None, tell };
+    let (session, renew_at) = (None, None);
+    let desk = OneCommand { consumer, destination, command, session, renew_after, renew_at, tell };
     Ok((Member::join_as(join, service, prefixes, desk)?, told))
 }
 

@@ -1,4 +1,6 @@
-//! `aldis command watch`: the flow of UMAA commands as it happens.
+//! `aldis command`: the flow of UMAA commands as it happens, and a provider to try consumers against.
+
+mod stand_in;
 
 use super::exit::Failure;
 use super::member::{Desk, Join, Member};
@@ -23,6 +25,8 @@ pub(crate) struct CommandArgs {
 enum What {
     /// Show commands, acknowledgements and statuses as they come, those that are open first.
     Watch(Watch),
+    /// Stand in for a provider, and fail every command in the way that is told.
+    StandIn(stand_in::StandIn),
 }
 
 #[derive(clap::Args)]
@@ -75,8 +79,10 @@ fn role(envelope: &Envelope) -> Option<Role> {
 
 impl CommandArgs {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let What::Watch(watch) = self.what;
-        watch.run()
+        match self.what {
+            What::Watch(watch) => watch.run(),
+            What::StandIn(stand_in) => stand_in.run(),
+        }
     }
 }
 

@@ -54,12 +54,17 @@ enum Format {
 /// Hands what the bus says to the watcher.
 struct Watching {
     watcher: Arc<Mutex<Option<Watcher>>>,
+    /// From when what comes is judged.
+    judges_from: Option<Monotonic>,
+    /// Whether it has been told that what comes is judged.
+    judges: bool,
     tell: mpsc::Sender<Told>,
 }
 
 /// What the desk and the signals tell the command.
 enum Told {
     Joined,
+    Judges,
     Stop,
 }
 
@@ -72,13 +77,24 @@ impl Desk for Watching {
         let mut watcher = self.watcher.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(watcher) = watcher.as_mut() else { return };
         match input {
-            Input::HistoryComplete(_) => watcher.history_complete(now.monotonic),
+            Input::HistoryComplete(_) => {
+                watcher.history_complete(now.monotonic);
+                self.judges_from = watcher.judges_from();
+            }
             Input::Message(envelope) if envelope.message.call.is_none() => {
                 watcher.message(now.monotonic, envelope);
             }
             Input::Token(writer, false) => watcher.vanished(now.monotonic, writer),
+            Input::Deadline if !self.judges && self.judges_from.is_some_and(|from| from <= now.monotonic) => {
+                self.judges = true;
+                let _ = self.tell.send(Told::Judges);
+            }
             _ => {}
         }
+    }
+
+    fn next_deadline(&self) -> Option<Monotonic> {
+        self.judges_from.filter(|_| !self.judges)
     }
 }
 
@@ -104,7 +120,7 @@ impl Conform {
         let (tell, told) = mpsc::channel();
         let watcher = Watcher::joining(monitor, Decoder::new([]));
         let shared = Arc::new(Mutex::new(Some(watcher)));
-        let desk = Watching { watcher: shared.clone(), tell: tell.clone() };
+        let desk = Watching { watcher: shared.clone(), judges_from: None, judges: false, tell: tell.clone() };
         let prefixes = Prefix::new("UMAA::").into_iter().collect();
         let member = Member::join(&self.join, prefixes, desk)?;
         let joined = told.recv_timeout(super::JOIN_WITHIN);
@@ -115,7 +131,13 @@ impl Conform {
             })?;
             let wait = self.span.map_or(Duration::MAX, |span| span.0);
             // A session that comes back ends nothing.
-            while let Ok(Told::Joined) = told.recv_timeout(wait.saturating_sub(started.elapsed())) {}
+            while let Ok(news @ (Told::Joined | Told::Judges)) =
+                told.recv_timeout(wait.saturating_sub(started.elapsed()))
+            {
+                if matches!(news, Told::Judges) {
+                    eprintln!("aldis: what the fleet retains is known; what comes from now on is judged");
+                }
+            }
         }
         member.leave()?;
         joined.map_err(|_| self.join.unreachable())?;

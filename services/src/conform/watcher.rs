@@ -37,6 +37,11 @@ impl Watcher {
         self.judges_from = Some(now + SETTLING);
     }
 
+    /// From when what comes is news, and judged; none while the history is not complete.
+    pub fn judges_from(&self) -> Option<Monotonic> {
+        self.judges_from
+    }
+
     /// An envelope has come.
     pub fn message(&mut self, now: Monotonic, envelope: &Envelope) {
         let Some(observation) = self.decoder.observation(now, envelope) else { return };

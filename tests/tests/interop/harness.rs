@@ -1,6 +1,6 @@
 //! A node and peers in Python beside it, as real processes; every wait has its bound.
 
-use aldis_tests::{Directory, Done, Node, PATIENCE, aldis, free_port, program, root};
+use aldis_tests::{Directory, Done, Log, Node, PATIENCE, aldis, free_port, program, root};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -39,6 +39,25 @@ impl Running {
         }
     }
 
+    /// Writes a line to its input.
+    pub(crate) fn tell(&mut self, line: &Value) {
+        let stdin = self.stdin.as_mut().expect("its input has not ended");
+        writeln!(stdin, "{line}").expect("it reads its input");
+    }
+
+    /// Sends it a signal by its name, such as `TERM`.
+    pub(crate) fn signal(&self, signal: &str) {
+        let process = self.child.id().to_string();
+        let sent = Command::new("kill").args([&format!("-{signal}"), &process]).status();
+        assert!(sent.expect("kill runs").success(), "signal {signal} for process {process}");
+    }
+
+    /// Waits for its end, and gives what it still writes and its exit code.
+    pub(crate) fn end(mut self) -> (Vec<Value>, Option<i32>) {
+        let rest = std::iter::from_fn(|| self.next()).collect();
+        (rest, self.child.wait().expect("a child can be waited for").code())
+    }
+
     /// Ends its input, and gives what it still writes until it ends well.
     pub(crate) fn finish(mut self) -> Vec<Value> {
         self.stdin = None;
@@ -56,29 +75,61 @@ impl Drop for Running {
     }
 }
 
+/// A watch over the fleet by `aldis conform`.
+pub(crate) struct Watch(Running);
+
+impl Watch {
+    /// Ends it, and gives its report.
+    pub(crate) fn report(self) -> Value {
+        self.0.signal("INT");
+        let (mut said, code) = self.0.end();
+        assert_eq!(said.len(), 1, "{said:?}");
+        let report = said.remove(0);
+        assert_eq!(code, Some(i32::from(report["clauses_broken"] != 0)), "{report}");
+        report
+    }
+}
+
 /// Entity 400, a router that others join.
 pub(crate) struct Fleet {
     pub(crate) node: Node,
     locator: String,
-    _directory: Directory,
+    directory: Directory,
 }
 
 impl Fleet {
     pub(crate) fn start() -> Self {
+        Self::start_as(400)
+    }
+
+    /// The same with another entity in its place.
+    pub(crate) fn start_as(entity: u64) -> Self {
         let locator = format!("tcp/127.0.0.1:{}", free_port());
         let directory = Directory::new();
         let text = format!(
-            "fleet = \"{FLEET}\"\nname = \"node-400\"\nentities = [400]\n\
+            "fleet = \"{FLEET}\"\nname = \"node-{entity}\"\nentities = [{entity}]\n\
              [bus]\nmode = \"router\"\nlisten = [\"{locator}\"]\n[health]\nreport_period_ms = 200\n"
         );
         let node = Node::start(&directory.write("node.toml", &text));
-        let fleet = Self { node, locator, _directory: directory };
+        let fleet = Self { node, locator, directory };
         let begin = Instant::now();
         // It can be joined before it is ready: that it answers is the sign.
-        while fleet.aldis(&["call", "eid400sid1", "--ping"]).code != Some(0) {
+        while fleet.aldis(&["call", &format!("eid{entity}sid1"), "--ping"]).code != Some(0) {
             assert!(begin.elapsed() < PATIENCE, "the node does not answer");
         }
         fleet
+    }
+
+    /// Starts a further node that joins it: the head of its configuration, and its tables.
+    pub(crate) fn start_node(&self, name: &str, head: &str, tables: &str) -> Node {
+        let bus = format!("[bus]\nmode = \"client\"\nconnect = [\"{}\"]\n", self.locator);
+        let text = format!("fleet = \"{FLEET}\"\nname = \"{name}\"\n{head}\n{bus}{tables}");
+        Node::start(&self.directory.write(&format!("{name}.toml"), &text))
+    }
+
+    /// A file for a peer to write, in the directory of this fleet.
+    pub(crate) fn file(&self, name: &str) -> String {
+        self.directory.path().join(name).display().to_string()
     }
 
     fn joining<'a>(&'a self, args: &[&'a str]) -> Vec<&'a str> {
@@ -95,6 +146,15 @@ impl Fleet {
         Running::start(Command::new(program()).args(self.joining(args)))
     }
 
+    /// Starts a watch, and waits until it judges.
+    pub(crate) fn watch(&self) -> Watch {
+        let mut command = Command::new(program());
+        command.args(self.joining(&["conform", "--json", "--as", "9900"])).stderr(Stdio::piped());
+        let mut running = Running::start(&mut command);
+        Log::follow(running.child.stderr.take().expect("it is piped")).wait_for("is judged");
+        Watch(running)
+    }
+
     /// Starts the example peer.
     pub(crate) fn start_peer(&self, python: &Path, args: &[&str]) -> Running {
         self.start_script(python, "envelope/examples/peer.py", args)
@@ -103,6 +163,11 @@ impl Fleet {
     /// Starts the peer of these tests.
     pub(crate) fn start_foreign(&self, python: &Path, args: &[&str]) -> Running {
         self.start_script(python, "tests/tests/interop/foreign.py", args)
+    }
+
+    /// Starts the consumer or provider of the UMAA figures.
+    pub(crate) fn start_umaa(&self, python: &Path, args: &[&str]) -> Running {
+        self.start_script(python, "tests/python/figures.py", args)
     }
 
     fn start_script(&self, python: &Path, script: &str, args: &[&str]) -> Running {

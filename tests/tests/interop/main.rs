@@ -1,5 +1,6 @@
 //! Aldis and a peer in Python, which knows nothing of it but the written format, over real Zenoh.
 
+mod figures;
 mod harness;
 mod vectors;
 

@@ -21,14 +21,19 @@ const ANSWER_WITHIN: Duration = Duration::from_secs(30);
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  aldis allocate 400:autopilot --for 30s      for thirty seconds
-  aldis allocate 400:autopilot                until it is stopped, released or taken over")]
+  aldis allocate 400:autopilot --for 30s              for thirty seconds
+  aldis allocate 400:autopilot                        until it is stopped, released or taken over
+  aldis allocate 400:autopilot --for 10s --renew      the same, and free ten seconds after a crash")]
 pub(crate) struct Allocate {
     /// Entity and name, as in `400:autopilot`, or entity and GUID.
     resource: ResourceName,
     /// For how long. Default: without end.
     #[arg(long = "for")]
     span: Option<Within>,
+    /// Ask again at half of the time, again and again: control goes on until this command is stopped, and ends by itself soon
+    /// after it has crashed.
+    #[arg(long, requires = "span")]
+    renew: bool,
     /// The service of the entity that asks; its priority counts.
     #[arg(long, default_value = "100", value_name = "SID")]
     sid: ServiceId,
@@ -61,7 +66,9 @@ impl Allocate {
         super::super::run::watch_signals(move || {
             let _ = stop.send(Heard::Stop);
         })?;
-        let (member, news) = send(&self.join, self.sid, self.resource.arbiter(&guids), command)?;
+        let renew_after = self.span.filter(|_| self.renew).map(|span| span.0 / 2);
+        let arbiter = self.resource.arbiter(&guids);
+        let (member, news) = send(&self.join, self.sid, arbiter, command, renew_after)?;
         std::thread::Builder::new()
             .name("news".into())
             .spawn(move || news.into_iter().try_for_each(|news| heard_from.send(Heard::News(news))))

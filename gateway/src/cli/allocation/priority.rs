@@ -71,7 +71,7 @@ impl Priority {
             session_id: Guid::default(),
             destination: Guid::default(),
         };
-        let (member, news) = send(&self.join, self.sid, resource.arbiter(guids), command)?;
+        let (member, news) = send(&self.join, self.sid, resource.arbiter(guids), command, None)?;
         let ended = loop {
             match news.recv_timeout(ANSWER_WITHIN) {
                 Ok(News::Asked) => {}
