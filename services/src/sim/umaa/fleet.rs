@@ -299,6 +299,8 @@ impl Workload for UmaaFleet {
                 export: vec![Prefix::all()],
                 services,
                 bridges: Vec::new(),
+                links: Vec::new(),
+                journaled: false,
             }
         };
         arrangement.entities.iter().map(node).collect()
