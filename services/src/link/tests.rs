@@ -127,7 +127,15 @@ fn a_command_arrives_whole_once_and_its_sender_hears_of_it() {
         assert_eq!(b.numbers(), [7]);
         assert_eq!(b.delivered[0].envelope, sent);
         let words: Vec<_> = a.tickets.iter().map(|(ticket, state)| (ticket.0, state)).collect();
-        assert!(matches!(words[..], [(5, TicketState::Accepted { .. }), (5, TicketState::Delivered { .. })]));
+        assert!(matches!(
+            words[..],
+            [
+                (5, TicketState::Accepted { .. }),
+                (5, TicketState::OnAir { tries: 1 }),
+                ..,
+                (5, TicketState::Delivered { .. })
+            ]
+        ));
     }
 }
 

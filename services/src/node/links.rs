@@ -194,7 +194,7 @@ impl Node {
                 let known = attached.places.get(&carrier) == Some(&place);
                 self.links.give(id.0, link::Event::Frame(carrier, bytes));
                 if !known {
-                    self.from_elsewhere(now, id, carrier, place, effects);
+                    self.heard_elsewhere(now, id, carrier, place, effects);
                 }
             }
             LinkEvent::Up(carrier, mtu) => self.links.give(id.0, link::Event::CarrierUp(carrier, mtu)),
@@ -209,7 +209,7 @@ impl Node {
     }
 
     /// A frame came from a new place: if the link takes it for its peer's, the peer is there now.
-    fn from_elsewhere(
+    fn heard_elsewhere(
         &mut self,
         now: Now,
         id: LinkId,
