@@ -3,6 +3,8 @@
 mod administration;
 mod bridges;
 mod deliver;
+mod journaling;
+mod keeping;
 mod running;
 mod sharing;
 
@@ -22,6 +24,8 @@ use aldis_envelope::{
     Address, BootId, EntityId, Fleet, KeyHash, Keys, Label, Message, Monotonic, Now, Prefix, Priority,
     ServiceId, Space,
 };
+use journaling::Journaling;
+use keeping::Keeping;
 use sharing::Sharing;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -55,7 +59,7 @@ pub struct NodeConfig {
 }
 
 /// Where a message came from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Origin {
     Service(usize),
     Peer(BridgeId, PeerId),
@@ -96,6 +100,8 @@ pub struct Node {
     notes: Notes,
     work: VecDeque<Work>,
     sharing: Sharing,
+    keeping: Keeping,
+    journaling: Journaling,
     /// Requests that wait until the tokens are told: before that, nobody knows where they can go.
     waiting_calls: Vec<(usize, Message)>,
     /// Services with wishes in their outboxes.
@@ -136,6 +142,8 @@ impl Node {
             bridges: config.bridges.iter().map(|spec| Bridge::new(spec.clone(), &config.entities)).collect(),
             sharing: Sharing::new(Topics::new(config.topics.clone())),
             config,
+            keeping: Keeping::default(),
+            journaling: Journaling::default(),
             labels: Labels::default(),
             outbound: Outbound::default(),
             inbound: Inbound::default(),
@@ -171,13 +179,19 @@ impl Node {
     pub fn handle(&mut self, now: Now, events: &mut Vec<Event>, effects: &mut Vec<Effect>) {
         if self.started.is_none() {
             self.started = Some(now.monotonic);
-            self.start(now, effects);
+            if !self.journaling.is_opening() {
+                self.start(now, effects);
+            }
+        }
+        if self.journaling.is_opening() {
+            self.before_start(now, events, effects);
         }
         for event in events.drain(..) {
             self.event(now, event, effects);
             self.settle(now, effects);
         }
         self.finish_sharing(now, effects);
+        self.append(effects);
         self.update_pause(effects);
         self.arm(effects);
     }
@@ -214,6 +228,7 @@ impl Node {
             Event::Bridge(bridge, event) => self.bridge(now, bridge, event, effects),
             Event::Job(source, number, result) => self.job_done(now, source, number, result, effects),
             Event::Component(health) => self.component(now, &health),
+            Event::Journal(event) => self.journal(now, event, effects),
             Event::Shutdown => self.shutdown(now, effects),
         }
     }
@@ -291,7 +306,7 @@ impl Node {
 
     /// Stops reading while a peer that is not given up has too much waiting.
     fn update_pause(&mut self, effects: &mut Vec<Effect>) {
-        let congested = self.bridges.iter().any(Bridge::is_congested);
+        let congested = self.bridges.iter().any(Bridge::is_congested) || self.journaling.is_opening();
         if congested != self.input_is_paused {
             self.input_is_paused = congested;
             effects.push(Effect::PauseInput(congested));
@@ -303,9 +318,9 @@ impl Node {
         let bridges = self.bridges.iter().filter_map(Bridge::next_deadline);
         let shared = self.sharing.next_deadline();
         let next = services.chain(bridges).chain(self.calls.next_deadline()).chain(shared).min();
+        let next = if self.ending { self.journaling.end_by() } else { next };
         if let Some(at) = next
             && self.armed != next
-            && !self.ending
         {
             self.armed = next;
             effects.push(Effect::Arm(at));

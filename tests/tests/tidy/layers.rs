@@ -14,8 +14,8 @@ const PACKAGES: [(&str, &[&str]); 3] = [
 /// The modules of `services`, low to high. A module imports from lower rows alone, never from its own row, so that no
 /// circle can be.
 const LAYERS: [&[&str]; 8] = [
-    &["service"],
-    &["allow", "calls", "counters", "dds", "event", "journal", "notes", "streams"],
+    &["journal", "service"],
+    &["allow", "calls", "counters", "dds", "event", "notes", "streams"],
     &["link", "map", "plan", "umaa"],
     &["bridge", "labels"],
     &["conform", "health", "log", "track"],

@@ -116,7 +116,7 @@ fn a_delivery_is_confirmed_by_every_reader_or_the_missing_ones_are_named() {
     world.close_bus(readers[1]);
     say(&mut world, node, "?2");
     world.run_for(Duration::from_secs(6));
-    assert_eq!(of(&told)[1..], ["confirmed 2 Err(Unconfirmed { missing: [401] })"]);
+    assert_eq!(of(&told)[1..], ["confirmed 2 Err(Missing { missing: [401] })"]);
     // Its lease has run out: nobody waits for it.
     world.run_for(Duration::from_secs(6));
     say(&mut world, node, "?3");
