@@ -12,6 +12,7 @@ mod check;
 mod cure;
 mod entities;
 mod error;
+mod journal;
 mod locator;
 mod read;
 mod resource;
@@ -26,6 +27,7 @@ pub(crate) use bridge::{Bridge, Endpoint};
 pub(crate) use bus::Bus;
 pub(crate) use entities::{Entities, Operators};
 pub(crate) use error::ConfigError;
+pub(crate) use journal::Journal;
 pub(crate) use locator::Locator;
 pub(crate) use resource::{Allocation, Party, Resource};
 pub(crate) use schema::schema;
@@ -81,6 +83,9 @@ pub(crate) struct Config {
     /// What topics promise to their readers, where it is not what the patterns of UMAA say.
     #[serde(default, rename = "topic")]
     pub(crate) topics: Vec<Topic>,
+    /// Where the node keeps what must outlive the program. Default: nowhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) journal: Option<Journal>,
     /// What the program writes about itself.
     #[serde(default)]
     pub(crate) log: Log,
@@ -101,7 +106,9 @@ impl Config {
         let file = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|e| ConfigError::unreadable(&file, &e))?;
         let mut config = Self::parse(&file, &text)?;
-        config.bus.resolve(path.parent().unwrap_or(Path::new("")));
+        let directory = path.parent().unwrap_or(Path::new(""));
+        config.bus.resolve(directory);
+        config.journal.iter_mut().for_each(|journal| journal.resolve(directory));
         Ok(config)
     }
 

@@ -6,13 +6,17 @@ use crate::bus::Congestion;
 use crate::clock;
 use crate::config::{self, Config, bus};
 use aldis_envelope::{EntityId, Guids, Source};
+use aldis_services::journal::JournalConfig;
 use aldis_services::registry::{self, Kind};
 use aldis_services::{BridgeSpec, NodeConfig, ServiceSpec};
+use std::path::PathBuf;
 
 /// What the shell opens for a node.
 pub(crate) struct Outside {
     pub(super) bus: Joining,
     pub(super) bridges: Vec<Endpoint>,
+    /// The directory of the journal and how it is kept.
+    pub(super) journal: Option<(PathBuf, JournalConfig)>,
 }
 
 /// What the shell opens for a configuration.
@@ -32,7 +36,8 @@ pub(crate) fn outside(config: &Config) -> Result<Outside, bus::BusError> {
         },
         message_bytes_max: bridge.message_bytes_max as usize,
     });
-    Ok(Outside { bus, bridges: bridges.collect() })
+    let kept = |journal: &config::Journal| (journal.path.clone(), journal.config(crate::journal::seed()));
+    Ok(Outside { bus, bridges: bridges.collect(), journal: config.journal.as_ref().map(kept) })
 }
 
 /// The node of a configuration, in a new life.

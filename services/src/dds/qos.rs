@@ -65,7 +65,9 @@ impl Topics {
         let Address::Name(name) = address else { return None };
         match self.rules.iter().find(|rule| rule.prefix.matches(address)) {
             Some(rule) => rule.qos.map(|qos| match qos.keep {
-                Keep::ByPattern => Qos { keep: by_pattern(name.as_str()).map_or(Keep::All, |p| p.keep), ..qos },
+                Keep::ByPattern => {
+                    Qos { keep: by_pattern(name.as_str()).map_or(Keep::All, |p| p.keep), ..qos }
+                }
                 Keep::Last(_) | Keep::All => qos,
             }),
             None => by_pattern(name.as_str()),

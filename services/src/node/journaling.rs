@@ -174,6 +174,8 @@ impl Node {
                 Err(why) => unread.push(format!("record {number} of the journal is not read: {why}")),
             }
         }
+        let retained = self.sharing.writers.histories().map(|(_, history)| history.len() as u64);
+        self.counters.recovered = retained.sum();
         self.start(now, effects);
         let status = format!("start {}, {} samples retained again", recovered.start, self.counters.recovered);
         let damaged = !recovered.damage.is_empty() || !unread.is_empty();
@@ -220,7 +222,6 @@ impl Node {
             via: Vec::new(),
         };
         let envelope = Envelope { message, stamp };
-        self.counters.recovered += 1;
         self.counters.shed_retained += self.sharing.writers.wrote(now.monotonic, qos, publish, &envelope);
         self.sharing.writers.recorded(&envelope, number);
     }
@@ -250,10 +251,11 @@ impl Node {
         };
         let held = Held::new(now, work);
         let kept = match &self.journaling.stage {
-            Stage::Unusable(why) => Err((held, why.clone())),
+            Stage::Unusable(why) => Err(Box::new((held, why.clone()))),
             _ => self.keeping.keep(held, value),
         };
-        if let Err((held, why)) = kept {
+        if let Err(not_kept) = kept {
+            let (held, why) = *not_kept;
             let is_of_journal = !matches!(why, Refused::Batch(_));
             self.not_kept(now, held, &why, effects);
             if is_of_journal {
@@ -268,7 +270,8 @@ impl Node {
             let record = held.record();
             let kept = Kept { source_time: held.source_time, record };
             let Held { mut work, until, .. } = held;
-            work.confirm = work.confirm.zip(until).map(|((number, _), until)| (number, until - now.monotonic));
+            work.confirm =
+                work.confirm.zip(until).map(|((number, _), until)| (number, until - now.monotonic));
             self.counters.kept += u64::from(record.is_some());
             let place = self.label(&work.message.label);
             self.hand_on(now, place, work, Some(kept), effects);

@@ -52,6 +52,9 @@ impl Held {
     }
 }
 
+/// A message that is not kept, and why.
+pub(super) type NotKept = Box<(Held, Refused)>;
+
 /// A batch that is not on disk yet.
 struct OnItsWay {
     number: u64,
@@ -105,14 +108,14 @@ impl Keeping {
     ///
     /// # Errors
     /// Why it cannot be kept, with the message.
-    pub(super) fn keep(&mut self, mut held: Held, value: Bytes) -> Result<(), (Held, Refused)> {
+    pub(super) fn keep(&mut self, mut held: Held, value: Bytes) -> Result<(), NotKept> {
         let bytes = value.len() + OPERATION_BYTES;
         if bytes > RECORD_BYTES_MAX {
-            return Err((held, crate::journal::BatchError::Record(bytes).into()));
+            return Err(Box::new((held, crate::journal::BatchError::Record(bytes).into())));
         }
         let pending = self.bytes + self.batch.encoded_bytes() + bytes;
         if pending > BYTES_MAX || self.on_their_way.len() >= BATCHES_MAX || self.is_full() {
-            return Err((held, Refused::Behind { pending }));
+            return Err(Box::new((held, Refused::Behind { pending })));
         }
         if self.batch.encoded_bytes() + bytes > BATCH_BYTES_MAX / 2 {
             self.close_batch(Vec::new());

@@ -2,8 +2,8 @@
 
 use super::super::history::History;
 use super::{Writers, name_of};
-use aldis_envelope::{Envelope, Source};
 use aldis_envelope::aldis::dds::Retained;
+use aldis_envelope::{Envelope, Source};
 
 impl Writers {
     /// What is kept of what a source has written.

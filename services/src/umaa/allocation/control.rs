@@ -57,8 +57,8 @@ impl Managed {
 enum Ending {
     /// A consumer of higher priority took over.
     Interrupted(Guid),
-    /// The same consumer has begun another.
-    Replaced,
+    /// The same consumer has begun another, while it was in control by this one, or before the report had told so.
+    Replaced { was_in_control: bool },
 }
 
 /// All control of all resources.
@@ -148,7 +148,7 @@ impl Control {
         let hold = Hold { session, ends, confirmation: Confirmation::Unsent };
         if let Some(before) = managed.hold.replace(hold).filter(|before| before.session != session) {
             let ending = match before.session.source == session.source {
-                true => Ending::Replaced,
+                true => Ending::Replaced { was_in_control: before.confirmation == Confirmation::Given },
                 false => Ending::Interrupted(session.source),
             };
             self.ending.insert(before.session, ending);
@@ -332,7 +332,12 @@ impl Ending {
                 let text = format!("{by}, which goes before, took over");
                 Progress::Failed(super::super::command::decisions::failure_at_preemption(text))
             }
-            Self::Replaced => Progress::Completed,
+            Self::Replaced { was_in_control: true } => Progress::Completed,
+            // Completed would be EXECUTING first, and nobody had been told that this session controls anything.
+            Self::Replaced { was_in_control: false } => {
+                let text = "its consumer has begun another session before this one had control";
+                Progress::Failed(super::super::command::decisions::failure_at_preemption(text.to_owned()))
+            }
         }
     }
 }
