@@ -12,6 +12,7 @@ mod check;
 mod cure;
 mod entities;
 mod error;
+mod journal;
 mod link;
 mod locator;
 mod read;
@@ -28,6 +29,7 @@ pub(crate) use bridge::{Bridge, Endpoint};
 pub(crate) use bus::Bus;
 pub(crate) use entities::{Entities, Operators};
 pub(crate) use error::ConfigError;
+pub(crate) use journal::Journal;
 pub(crate) use link::{CarrierKind, KeyError, KeyFile, Link};
 pub(crate) use locator::Locator;
 pub(crate) use resource::{Allocation, Party, Resource};
@@ -87,6 +89,9 @@ pub(crate) struct Config {
     /// What topics promise to their readers, where it is not what the patterns of UMAA say.
     #[serde(default, rename = "topic")]
     pub(crate) topics: Vec<Topic>,
+    /// Where the node keeps what must outlive the program. Default: nowhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) journal: Option<Journal>,
     /// What the program writes about itself.
     #[serde(default)]
     pub(crate) log: Log,
@@ -110,6 +115,7 @@ impl Config {
         let directory = path.parent().unwrap_or(Path::new(""));
         config.bus.resolve(directory);
         config.links.iter_mut().for_each(|link| link.resolve(directory));
+        config.journal.iter_mut().for_each(|journal| journal.resolve(directory));
         Ok(config)
     }
 

@@ -71,6 +71,16 @@ impl JournalThread {
         self.appended += 1;
         Ok(self.appended)
     }
+
+    /// Hands over a batch of an owner who sees to it himself that no more is on its way than can be: it is the next by number.
+    pub(crate) fn hand_over(&mut self, batch: Batch) {
+        self.pending.fetch_add(batch.encoded_bytes(), Ordering::Relaxed);
+        self.appended += 1;
+        if let Some(batches) = &self.batches {
+            // A thread that has panicked takes nothing more: then too much waits, and the owner says so.
+            let _ = batches.send(batch);
+        }
+    }
 }
 
 impl Drop for JournalThread {

@@ -10,8 +10,11 @@ pub(crate) use wiring::{Outside, node_config, outside};
 
 use crate::bridge::uxas_tcp;
 use crate::carrier::{serial, udp};
+use crate::journal::{JournalError, JournalThread};
 use aldis_services::event::BridgeId;
+use aldis_services::journal::JournalConfig;
 use aldis_services::{Event, Node, NodeConfig};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::{Notify, mpsc, watch};
@@ -19,6 +22,9 @@ use tokio::task::LocalSet;
 
 /// How long the orderly end of a node may take before it is cut off.
 const SHUTDOWN_WITHIN: Duration = Duration::from_secs(5);
+
+/// How many events of the journal the node takes in one turn.
+const JOURNAL_EVENTS_AT_ONCE: usize = 1_024;
 
 /// What can be asked of a running node from outside.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,6 +41,9 @@ pub(crate) enum RuntimeError {
     /// The configuration cannot be.
     #[error("{0}")]
     Config(String),
+    /// The journal cannot be opened.
+    #[error("{0}")]
+    Journal(#[from] JournalError),
     /// The machine gives no runtime.
     #[error("no runtime: {0}")]
     Runtime(#[from] std::io::Error),
@@ -54,9 +63,17 @@ pub(crate) fn run(
     }
     let links = config.links.len();
     let node = Node::new(config).map_err(RuntimeError::Config)?;
+    let (journal, told) = match &outside.journal {
+        Some((directory, config)) => open_journal(directory, config.clone()).map(Option::unzip)?,
+        None => (None, None),
+    };
+    let node = if journal.is_some() { node.with_journal() } else { node };
     let local = LocalSet::new();
     local.block_on(&runtime, async move {
-        let (core, ends) = Core::build(node, dialects, tokio::runtime::Handle::current());
+        let (core, ends) = Core::build(node, journal, dialects, tokio::runtime::Handle::current());
+        if let Some(told) = told {
+            tokio::task::spawn_local(journal_events(core.clone(), told));
+        }
         drive(core, ends, outside.for_links(links), keys, control).await;
     });
     runtime.shutdown_timeout(Duration::from_secs(1));
@@ -85,7 +102,8 @@ async fn drive(
     let inbox = Arc::new(crate::bus::Inbox::new(keys.clone(), direct(core.clone())));
     let mut tasks = tokio::task::JoinSet::new();
     tasks.spawn_local(deadlines(core.clone(), timer));
-    tasks.spawn_local(disk::watch(core.clone()));
+    let kept = outside.journal.map_or_else(|| PathBuf::from("."), |(directory, _)| directory);
+    tasks.spawn_local(disk::watch(core.clone(), kept));
     tasks.spawn_local(deferred(core.clone(), wake));
     tasks.spawn_local(job_results(core.clone(), jobs));
     tasks.spawn_local(bus_task::drain(core.clone(), inbox.clone(), paused.clone()));
@@ -159,6 +177,28 @@ fn deadline(core: &Shared) {
     let mut core = core.lock();
     core.disarm();
     core.handle(&mut vec![Event::Deadline]);
+}
+
+/// A journal's thread, and what it tells.
+type Opened = (JournalThread, mpsc::UnboundedReceiver<Event>);
+
+fn open_journal(directory: &Path, config: JournalConfig) -> Result<Option<Opened>, JournalError> {
+    // The node lets no more be on its way than the journal takes, so that what it is told is bounded too.
+    let (tell, told) = mpsc::unbounded_channel();
+    let thread = JournalThread::start(directory, config, move |events| {
+        for event in events.drain(..) {
+            // Nobody listens any more where the node has ended.
+            let _ = tell.send(Event::Journal(event));
+        }
+    })?;
+    Ok(Some((thread, told)))
+}
+
+async fn journal_events(core: Shared, mut told: mpsc::UnboundedReceiver<Event>) {
+    let mut events = Vec::new();
+    while told.recv_many(&mut events, JOURNAL_EVENTS_AT_ONCE).await > 0 {
+        core.lock().handle(&mut events);
+    }
 }
 
 async fn job_results(core: Shared, mut jobs: mpsc::UnboundedReceiver<Event>) {

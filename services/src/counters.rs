@@ -62,6 +62,12 @@ counters! {
     retold,
     /// Retained samples dropped because a topic's limit was reached.
     shed_retained,
+    /// Samples of persistent topics that the journal has on disk.
+    kept,
+    /// Samples of persistent topics that the journal does not keep: refused, nobody has got them.
+    not_kept,
+    /// Retained samples of former lives, read back from the journal.
+    recovered,
     /// Words of other nodes that could not be read, or came from a source that is not theirs.
     refused_among_nodes,
     /// Crashes of services.

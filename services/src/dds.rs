@@ -8,11 +8,13 @@
 mod history;
 mod qos;
 mod reading;
+mod record;
 mod writers;
 
 pub use history::History;
 pub use qos::{Durability, Keep, Qos, TopicRule, Topics};
 pub use reading::{Reading, Step};
+pub use record::{Record, RecordError};
 pub use writers::{Confirmed, Writers};
 
 use aldis_envelope::{BootId, EntityId};

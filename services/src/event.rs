@@ -1,5 +1,6 @@
 //! All that a node can be told, and all that it can ask for. A shell knows nothing else of it.
 
+use crate::journal::{Batch, JournalEvent};
 use crate::link::{CarrierId, Record};
 use crate::service::{ComponentHealth, Job, JobOutput, Note};
 use aldis_envelope::codec::native::HeaderError;
@@ -62,6 +63,8 @@ pub enum Event {
     Job(Source, u64, Result<JobOutput, String>),
     /// The health of something that the shell looks after changed.
     Component(ComponentHealth),
+    /// The journal tells something. A node with a journal starts when all that stands in it has been told.
+    Journal(JournalEvent),
     /// The moment of the last [`Effect::Arm`] has come.
     Deadline,
     /// The node must end.
@@ -139,6 +142,9 @@ pub enum Effect {
     PauseInput(bool),
     /// Compute something outside the loop and tell with [`Event::Job`].
     Job(Source, u64, Job),
+    /// Append a batch to the journal, written before those after it. It has this number, one more than the last one's; what
+    /// becomes of it is told with [`Event::Journal`]. No more is on its way at a time than a journal takes.
+    Append(u64, Batch),
     /// Tell people.
     Say(Note),
     /// Send [`Event::Deadline`] at this moment; replaces the last one.

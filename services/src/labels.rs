@@ -28,6 +28,8 @@ pub(crate) struct Entry {
     pub(crate) import: bool,
     /// What its topic promises; none is best effort.
     pub(crate) qos: Option<Qos>,
+    /// Whether it is on disk before anybody has it.
+    pub(crate) persistent: bool,
     /// Whether it is of what nodes tell one another.
     pub(crate) among_nodes: bool,
     /// Its place among the outgoing streams, once it was sent.

@@ -3,6 +3,8 @@
 mod administration;
 mod bridges;
 mod deliver;
+mod journaling;
+mod keeping;
 mod links;
 mod running;
 mod sharing;
@@ -24,6 +26,8 @@ use aldis_envelope::{
     Address, BootId, EntityId, Fleet, KeyHash, Keys, Label, Message, Monotonic, Now, Prefix, Priority,
     ServiceId, Space, Wall,
 };
+use journaling::Journaling;
+use keeping::Keeping;
 use links::Links;
 use sharing::Sharing;
 use std::collections::{BTreeMap, VecDeque};
@@ -62,7 +66,7 @@ pub struct NodeConfig {
 }
 
 /// Where a message came from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Origin {
     Service(usize),
     Peer(BridgeId, PeerId),
@@ -116,6 +120,8 @@ pub struct Node {
     work: VecDeque<Work>,
     sharing: Sharing,
     links: Links,
+    keeping: Keeping,
+    journaling: Journaling,
     /// Requests that wait until the tokens are told: before that, nobody knows where they can go.
     waiting_calls: Vec<(usize, Message)>,
     /// Services with wishes in their outboxes.
@@ -159,6 +165,8 @@ impl Node {
             sharing: Sharing::new(Topics::new(config.topics.clone())),
             links: Links::new(&config.links, config.journaled, config.boot, &config.fleet),
             config,
+            keeping: Keeping::default(),
+            journaling: Journaling::default(),
             labels: Labels::default(),
             outbound: Outbound::default(),
             inbound: Inbound::default(),
@@ -195,7 +203,12 @@ impl Node {
     pub fn handle(&mut self, now: Now, events: &mut Vec<Event>, effects: &mut Vec<Effect>) {
         if self.started.is_none() {
             self.started = Some(now.monotonic);
-            self.start(now, effects);
+            if !self.journaling.is_opening() {
+                self.start(now, effects);
+            }
+        }
+        if self.journaling.is_opening() {
+            self.before_start(now, events, effects);
         }
         for event in events.drain(..) {
             self.event(now, event, effects);
@@ -204,6 +217,7 @@ impl Node {
         self.run_links(now, effects);
         self.finish_sharing(now, effects);
         self.run_links(now, effects);
+        self.append(effects);
         self.update_pause(effects);
         self.arm(effects);
     }
@@ -247,6 +261,7 @@ impl Node {
             Event::PersistFailed(number, why) => self.link_written(number, Some(&why)),
             Event::Job(source, number, result) => self.job_done(now, source, number, result, effects),
             Event::Component(health) => self.component(now, &health),
+            Event::Journal(event) => self.journal(now, event, effects),
             Event::Shutdown => self.shutdown(now, effects),
         }
     }
@@ -326,7 +341,7 @@ impl Node {
 
     /// Stops reading while a peer that is not given up has too much waiting.
     fn update_pause(&mut self, effects: &mut Vec<Effect>) {
-        let congested = self.bridges.iter().any(Bridge::is_congested);
+        let congested = self.bridges.iter().any(Bridge::is_congested) || self.journaling.is_opening();
         if congested != self.input_is_paused {
             self.input_is_paused = congested;
             effects.push(Effect::PauseInput(congested));
@@ -339,9 +354,9 @@ impl Node {
         let shared = self.sharing.next_deadline();
         let others = [self.calls.next_deadline(), shared, self.links.next_deadline()];
         let next = services.chain(bridges).chain(others.into_iter().flatten()).min();
+        let next = if self.ending { self.journaling.end_by() } else { next };
         if let Some(at) = next
             && self.armed != next
-            && !self.ending
         {
             self.armed = next;
             effects.push(Effect::Arm(at));

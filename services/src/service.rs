@@ -37,8 +37,9 @@ pub enum Input<'a> {
     Started,
     /// A message that it subscribed to or that is addressed to it; requests and replies of calls too.
     Message(&'a Envelope),
-    /// A retained sample of its own, from a former life of this service: it comes right after the start, where something
-    /// keeps samples over restarts. The node does not yet: it is not joined to the journal.
+    /// A retained sample of its own, from a former life of this service: it comes right after the start. The node keeps what it
+    /// retains over a crash of the service; over the end of the process it keeps what is persistent, in the journal. What had
+    /// ended does not come.
     Recovered(&'a Envelope),
     /// What others retain for its subscriptions has come, as far as it is to be had: true where every node that is known
     /// has told all of it, false where one has not in time or no other node is known. Comes once after each start; what comes later is news.
@@ -63,12 +64,18 @@ pub enum Input<'a> {
     Shutdown,
 }
 
-/// Not every matched reliable reader has confirmed a sample in time.
+/// Why a sample is not confirmed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("not confirmed in time by {}", .missing.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "))]
-pub struct Unconfirmed {
-    /// The nodes whose readers have not.
-    pub missing: Vec<EntityId>,
+pub enum Unconfirmed {
+    /// Not every matched reliable reader has confirmed it in time.
+    #[error("not confirmed in time by {}", .missing.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "))]
+    Missing {
+        /// The nodes whose readers have not.
+        missing: Vec<EntityId>,
+    },
+    /// Its topic is persistent and the journal does not keep it: nobody has got it.
+    #[error("not kept: {0}")]
+    NotKept(String),
 }
 
 /// What a job returns.

@@ -2,6 +2,7 @@
 
 mod board;
 mod control;
+mod crashing;
 mod fleet;
 mod linked;
 mod screen;
@@ -30,7 +31,8 @@ const STATUS_WITHIN: Duration = Duration::from_secs(10);
 ///
 /// The boats move along simple tracks and tell where they are (LMCP) and how they do (UMAA HealthReport); shore calls
 /// them each second; boat 403 is silenced for a while and comes back. A planner and an operator on shore contend for the
-/// autopilot of boat 401 (UMAA ResourceAllocation): the operator takes over by priority, the planner's time runs out.
+/// autopilot of boat 401 (UMAA ResourceAllocation): the operator takes over by priority, the planner's time runs out. The
+/// arbiter of boat 402 crashes now and then and goes on with the command that it was executing.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  aldis demo\n  aldis demo --headless --seconds 15 --json\n  aldis demo --headless --seconds 60 --link L1 --json"
@@ -121,6 +123,10 @@ impl Demo {
                 "given": result.control.given, "expired": result.control.expired,
                 "taken_over": result.control.taken_over, "rejected": result.control.rejected,
                 "ended_otherwise": result.control.otherwise,
+            },
+            "provider": {
+                "crashes": result.crashes, "commands_recovered": result.recovery.recovered,
+                "ended_otherwise": result.recovery.otherwise,
             },
             "silenced": SILENCED,
             "seconds": result.ran.as_secs_f64().round(),

@@ -15,6 +15,9 @@ pub(super) fn check(config: &Config) -> Vec<Fault> {
     services(config, &mut faults);
     links(config, &mut faults);
     health(config, &mut faults);
+    faults.extend(super::topic::check(&config.topics, config.journal.as_ref()));
+    let journal = config.journal.as_ref().map_or(Ok(()), super::Journal::check);
+    faults.extend(journal.err().map(|fault| fault.below("journal")));
     faults.extend(config.checked_arbitration().err());
     faults
 }

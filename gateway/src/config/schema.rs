@@ -92,6 +92,7 @@ mod tests {
             "routing",
             "bridge",
             "allow",
+            "journal",
             "log",
             "health",
             "service",

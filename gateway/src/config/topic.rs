@@ -1,5 +1,7 @@
 //! What topics promise to their readers, where it is not what the patterns of UMAA say.
 
+use super::error::Fault;
+use super::journal::Journal;
 use super::schema;
 use aldis_envelope::Prefix;
 use aldis_services::dds::{Durability, Keep, Qos, TopicRule};
@@ -20,7 +22,7 @@ pub(crate) struct Topic {
     /// For how long samples are kept. Default: transient-local. Without meaning where reliability is best-effort.
     #[serde(default)]
     pub(crate) durability: Kept,
-    /// How many samples of each instance are kept. Default: all.
+    /// How many samples of each instance are kept. Default: what the pattern of UMAA says of the topic, all of other topics.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<u32>", range(min = 1))]
     pub(crate) keep_last: Option<NonZeroU32>,
@@ -50,6 +52,8 @@ pub(crate) enum Kept {
     /// For late joiners, as long as the node runs.
     #[default]
     TransientLocal,
+    /// For late joiners, also after the program has ended and started again: needs a `[journal]`.
+    Persistent,
 }
 
 fn samples_max() -> NonZeroU32 {
@@ -62,14 +66,34 @@ impl Topic {
         let durability = match self.durability {
             Kept::Volatile => Durability::Volatile,
             Kept::TransientLocal => Durability::TransientLocal,
+            Kept::Persistent => Durability::Persistent,
         };
-        let keep = self.keep_last.map_or(Keep::All, |count| Keep::Last(count.get()));
+        let keep = self.keep_last.map_or(Keep::ByPattern, |count| Keep::Last(count.get()));
         let qos = Qos { durability, keep, samples_max: self.samples_max.get() as usize };
         TopicRule {
             prefix: self.prefix.clone(),
             qos: (self.reliability == Reliability::Reliable).then_some(qos),
         }
     }
+}
+
+/// What topics promise and the rest of a configuration does not keep.
+pub(super) fn check(topics: &[Topic], journal: Option<&Journal>) -> Vec<Fault> {
+    let persistent = topics.iter().enumerate().filter(|(_, topic)| topic.durability == Kept::Persistent);
+    let fault = |(index, topic): (usize, &Topic)| {
+        let (message, help) = if topic.reliability == Reliability::BestEffort {
+            ("of a best-effort topic nothing is kept", "leave `reliability` out, or `durability`")
+        } else if journal.is_none() {
+            (
+                "a persistent topic without a journal",
+                "add a table [journal] with path = \"journal\", or choose durability = \"transient-local\"",
+            )
+        } else {
+            return None;
+        };
+        Some(Fault::new(format!("topic.{index}.durability"), message, help))
+    };
+    persistent.filter_map(fault).collect()
 }
 
 #[cfg(test)]
@@ -85,8 +109,28 @@ mod tests {
         let kept = rules("prefix = \"UMAA::X\"\nkeep_last = 3\nsamples_max = 10").unwrap().qos.unwrap();
         assert_eq!((kept.keep, kept.samples_max), (aldis_services::dds::Keep::Last(3), 10));
         assert_eq!(rules("prefix = \"afrl\"\nreliability = \"best-effort\"").unwrap().qos, None);
+        let kept = rules("prefix = \"afrl\"").unwrap().qos.unwrap();
+        assert_eq!(kept.keep, aldis_services::dds::Keep::ByPattern);
         for wrong in ["prefix = \"a\"\nkeep_last = 0", "prefix = \"eid0\"", "durability = \"volatile\""] {
             assert!(rules(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn what_is_persistent_needs_a_journal_and_reliability() {
+        let persistent = format!("{TOP}prefix = \"UMAA::X\"\ndurability = \"persistent\"\n");
+        let error = Config::parse("a.toml", &persistent).unwrap_err();
+        assert_eq!(
+            (error.message(), error.position()),
+            ("a persistent topic without a journal", Some((5, 14)))
+        );
+        assert!(error.cure().contains("[journal]"), "{}", error.cure());
+        let with_journal = format!("{persistent}[journal]\npath = \"kept\"\n");
+        let config = Config::parse("a.toml", &with_journal).unwrap();
+        let qos = config.topics[0].rule().qos.unwrap();
+        assert_eq!(qos.durability, aldis_services::dds::Durability::Persistent);
+        let best_effort = with_journal.replace("[journal]", "reliability = \"best-effort\"\n[journal]");
+        let error = Config::parse("a.toml", &best_effort).unwrap_err();
+        assert_eq!(error.message(), "of a best-effort topic nothing is kept");
     }
 }

@@ -6,6 +6,7 @@ use crate::bridge::uxas_tcp::Peers;
 use crate::bus::{Bus, BusError};
 use crate::carrier::Carriers;
 use crate::clock::Clock;
+use crate::journal::JournalThread;
 use aldis_envelope::{Dialect, Monotonic};
 use aldis_services::service::{Job, Level, Note};
 use aldis_services::{Effect, Event, Node};
@@ -76,6 +77,7 @@ pub(crate) struct Core {
     /// Kept for their memory.
     events: Vec<Event>,
     effects: Vec<Effect>,
+    journal: Option<JournalThread>,
     bus: Option<Bus>,
     peers: Peers,
     carriers: Carriers,
@@ -90,6 +92,7 @@ impl Core {
     /// A core and what the tasks around it follow.
     pub(super) fn build(
         node: Node,
+        journal: Option<JournalThread>,
         dialects: Vec<Dialect>,
         runtime: tokio::runtime::Handle,
     ) -> (Shared, Ends) {
@@ -109,6 +112,7 @@ impl Core {
             clock,
             events: Vec::new(),
             effects,
+            journal,
             bus: None,
             peers,
             carriers: Carriers::default(),
@@ -204,6 +208,11 @@ impl Core {
             }
             Effect::PauseInput(paused) => {
                 self.paused.send_replace(paused);
+            }
+            Effect::Append(_, batch) => {
+                if let Some(journal) = &mut self.journal {
+                    journal.hand_over(batch);
+                }
             }
             Effect::Say(note) => say(&note),
             Effect::Job(source, number, job) => self.start_job(source, number, job),

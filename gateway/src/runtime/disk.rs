@@ -1,8 +1,9 @@
-//! Looks after the disk that the program runs on, for the node's health reports.
+//! Looks after the disk of the journal, or the one that the program runs on, for the node's health reports.
 
 use super::Shared;
 use aldis_services::Event;
 use aldis_services::service::{Component, ComponentHealth, Condition};
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// How often the disk is looked at: disks fill slowly.
@@ -12,11 +13,11 @@ const SCARCE: f64 = 0.05;
 /// Below this many free bytes nothing that must be kept can be.
 const FULL_BYTES: u64 = 16 << 20;
 
-/// Tells the node how the disk does, whenever that changes.
-pub(super) async fn watch(core: Shared) {
+/// Tells the node how the disk of a directory does, whenever that changes.
+pub(super) async fn watch(core: Shared, directory: PathBuf) {
     let mut told = None;
     loop {
-        let (condition, status) = look();
+        let (condition, status) = look(&directory);
         if told != Some(condition) {
             told = Some(condition);
             let health = ComponentHealth { component: Component::Resource("disk"), condition, status };
@@ -26,8 +27,8 @@ pub(super) async fn watch(core: Shared) {
     }
 }
 
-fn look() -> (Condition, String) {
-    match rustix::fs::statvfs(".") {
+fn look(directory: &Path) -> (Condition, String) {
+    match rustix::fs::statvfs(directory) {
         Ok(disk) => judge(disk.f_bavail * disk.f_frsize, disk.f_blocks * disk.f_frsize),
         Err(why) => (Condition::Failed, format!("cannot be read: {why}")),
     }

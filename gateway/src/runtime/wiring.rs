@@ -9,10 +9,12 @@ use crate::clock;
 use crate::config::{self, Config, bus};
 use aldis_envelope::{EntityId, Guids, Source};
 use aldis_services::LinkId;
+use aldis_services::journal::JournalConfig;
 use aldis_services::link::{CarrierId, LinkKey};
 use aldis_services::registry::{self, Kind};
 use aldis_services::uxas::Core;
 use aldis_services::{BridgeSpec, NodeConfig, ServiceSpec};
+use std::path::PathBuf;
 
 /// What the shell opens for a node.
 pub(crate) struct Outside {
@@ -23,6 +25,8 @@ pub(crate) struct Outside {
     pub(super) udp: Vec<udp::Port>,
     pub(super) lines: Vec<serial::Line>,
     pub(super) channels: Vec<Channel>,
+    /// The directory of the journal and how it is kept.
+    pub(super) journal: Option<(PathBuf, JournalConfig)>,
 }
 
 impl Outside {
@@ -69,7 +73,9 @@ pub(crate) fn outside(config: &Config) -> Result<Outside, OutsideError> {
     let link_keys = link_keys.collect::<Result<_, _>>()?;
     let (udp, lines) = carriers(config);
     let channels = channels(config)?;
-    Ok(Outside { bus, bridges: bridges.collect(), link_keys, udp, lines, channels })
+    let kept = |journal: &config::Journal| (journal.path.clone(), journal.config(crate::journal::seed()));
+    let journal = config.journal.as_ref().map(kept);
+    Ok(Outside { bus, bridges: bridges.collect(), link_keys, udp, lines, channels, journal })
 }
 
 /// The carriers over Zenoh networks of their own.

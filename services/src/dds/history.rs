@@ -20,6 +20,24 @@ pub struct History {
     ended: VecDeque<(u64, Option<KeyHash>)>,
     broken_upto: u64,
     shed: u64,
+    records: Records,
+}
+
+/// The journal's records of the samples of one stream. Empty where its topic is not persistent.
+#[derive(Debug, Default)]
+struct Records {
+    /// By sequence.
+    held: BTreeMap<u64, u64>,
+    /// Those of samples that are kept no longer.
+    forgotten: Vec<u64>,
+}
+
+impl Records {
+    fn sample_goes(&mut self, sequence: u64) {
+        if !self.held.is_empty() {
+            self.forgotten.extend(self.held.remove(&sequence));
+        }
+    }
 }
 
 /// A part of a history.
@@ -43,13 +61,14 @@ impl History {
             ended: VecDeque::new(),
             broken_upto: 0,
             shed: 0,
+            records: Records::default(),
         }
     }
 
     /// Keeps a sample; what it supersedes goes.
     pub(super) fn add(&mut self, envelope: Envelope) {
         let sequence = envelope.stamp.sequence;
-        let instance = envelope.message.instance.as_ref().map(|instance| instance.hash);
+        let instance = instance_of(&envelope);
         let ends = envelope.message.change != Change::Put;
         self.samples.insert(sequence, envelope);
         let of_instance = self.instances.entry(instance).or_default();
@@ -58,6 +77,7 @@ impl History {
             let over = of_instance.len().saturating_sub(count.max(1) as usize);
             for superseded in of_instance.drain(..over) {
                 self.samples.remove(&superseded);
+                self.records.sample_goes(superseded);
             }
         }
         if ends {
@@ -80,6 +100,7 @@ impl History {
                 let keep_from = of_instance.partition_point(|&s| s < sequence);
                 for superseded in of_instance.drain(..keep_from) {
                     self.samples.remove(&superseded);
+                    self.records.sample_goes(superseded);
                 }
                 self.ended.push_back((sequence, instance));
             }
@@ -107,13 +128,27 @@ impl History {
 
     fn remove_first(&mut self) -> Option<u64> {
         let (&sequence, envelope) = self.samples.first_key_value()?;
-        let instance = envelope.message.instance.as_ref().map(|instance| instance.hash);
+        let instance = instance_of(envelope);
         self.remove(sequence, instance);
         Some(sequence)
     }
 
+    /// The journal holds a sample under a number.
+    pub(super) fn recorded(&mut self, sequence: u64, record: u64) {
+        match self.samples.contains_key(&sequence) {
+            true => drop(self.records.held.insert(sequence, record)),
+            false => self.records.forgotten.push(record),
+        }
+    }
+
+    /// Moves the records of samples that are kept no longer, in the order in which they went.
+    pub(super) fn take_forgotten(&mut self, into: &mut Vec<u64>) {
+        into.append(&mut self.records.forgotten);
+    }
+
     fn remove(&mut self, sequence: u64, instance: Option<KeyHash>) {
         self.samples.remove(&sequence);
+        self.records.sample_goes(sequence);
         if let Some(of_instance) = self.instances.get_mut(&instance) {
             of_instance.retain(|&s| s != sequence);
             if of_instance.is_empty() {
@@ -142,6 +177,17 @@ impl History {
         self.samples.values()
     }
 
+    /// The samples of instances that have not ended, by sequence; none where they are kept for the readers of the moment alone.
+    pub fn living(&self) -> impl Iterator<Item = &Envelope> {
+        let is_volatile = self.qos.durability == Durability::Volatile;
+        let ends = self.samples.iter().filter(|(_, sample)| sample.message.change != Change::Put);
+        let ends: BTreeMap<_, _> = ends.map(|(&sequence, sample)| (instance_of(sample), sequence)).collect();
+        let is_living = move |sequence: &u64, sample: &Envelope| {
+            !is_volatile && ends.get(&instance_of(sample)).is_none_or(|end| end < sequence)
+        };
+        self.samples.iter().filter(move |(sequence, sample)| is_living(sequence, sample)).map(|(_, s)| s)
+    }
+
     /// How many were dropped against the topic's promise since this was last asked.
     pub(super) fn take_shed(&mut self) -> u64 {
         std::mem::take(&mut self.shed)
@@ -156,6 +202,10 @@ impl History {
     pub fn is_empty(&self) -> bool {
         self.samples.is_empty()
     }
+}
+
+fn instance_of(sample: &Envelope) -> Option<KeyHash> {
+    sample.message.instance.as_ref().map(|instance| instance.hash)
 }
 
 #[cfg(test)]
@@ -218,6 +268,33 @@ mod tests {
         assert_eq!(kept(&history), [4]);
         history.add(sample(5, 7, Change::Put));
         assert_eq!(kept(&history), [4, 5], "alive again");
+    }
+
+    #[test]
+    fn the_records_of_what_goes_are_told_in_the_order_in_which_it_went() {
+        let mut history = history(Durability::Persistent, Keep::Last(1), 3);
+        let mut forgotten = Vec::new();
+        for (sequence, id) in [(1, 7), (2, 8), (3, 7), (4, 9), (5, 10)] {
+            history.add(sample(sequence, id, Change::Put));
+            history.recorded(sequence, 100 + sequence);
+        }
+        history.take_forgotten(&mut forgotten);
+        assert_eq!(forgotten, [101, 102], "superseded, then shed by the limit");
+        history.add(sample(6, 7, Change::Dispose));
+        history.recorded(6, 106);
+        history.recorded(5000, 200);
+        history.take_forgotten(&mut forgotten);
+        assert_eq!(forgotten[2..], [103, 200], "what was never kept is forgotten at once");
+        assert_eq!(history.living().map(|s| s.stamp.sequence).collect::<Vec<_>>(), [4, 5]);
+    }
+
+    #[test]
+    fn what_ended_and_came_again_lives() {
+        let mut history = history(Durability::TransientLocal, Keep::All, 100);
+        for (sequence, change) in [(1, Change::Put), (2, Change::Unregister), (3, Change::Put)] {
+            history.add(sample(sequence, 7, change));
+        }
+        assert_eq!(history.living().map(|s| s.stamp.sequence).collect::<Vec<_>>(), [3]);
     }
 
     #[test]

@@ -12,6 +12,9 @@ pub enum Durability {
     Volatile,
     /// For late joiners, as long as the writer's node lives.
     TransientLocal,
+    /// For late joiners, also after the process of the writer's node has ended and started again. It is on disk before anybody
+    /// has it.
+    Persistent,
 }
 
 /// How many samples of an instance are kept.
@@ -21,6 +24,8 @@ pub enum Keep {
     Last(u32),
     /// All, within the limit.
     All,
+    /// As the pattern of the topic's name says; all where it says nothing. A rule may say so, never a topic.
+    ByPattern,
 }
 
 /// What a topic promises to its reliable readers.
@@ -59,7 +64,12 @@ impl Topics {
     pub fn of(&self, address: &Address) -> Option<Qos> {
         let Address::Name(name) = address else { return None };
         match self.rules.iter().find(|rule| rule.prefix.matches(address)) {
-            Some(rule) => rule.qos,
+            Some(rule) => rule.qos.map(|qos| match qos.keep {
+                Keep::ByPattern => {
+                    Qos { keep: by_pattern(name.as_str()).map_or(Keep::All, |p| p.keep), ..qos }
+                }
+                Keep::Last(_) | Keep::All => qos,
+            }),
             None => by_pattern(name.as_str()),
         }
     }
@@ -108,5 +118,15 @@ mod tests {
         assert_eq!(topics.of(&Address::new("UMAA::SO::XCommand").unwrap()), None);
         assert_eq!(topics.of(&Address::new("UMAA::SO::YCommand").unwrap()), Some(qos));
         assert_eq!(topics.of(&Address::new("afrl").unwrap()), None);
+    }
+
+    #[test]
+    fn a_rule_may_leave_how_many_are_kept_to_the_pattern() {
+        let qos = Qos { durability: Durability::Persistent, keep: Keep::ByPattern, samples_max: 9 };
+        let topics = Topics::new(vec![TopicRule { prefix: Prefix::all(), qos: Some(qos) }]);
+        let kept = |name: &str| topics.of(&Address::new(name).unwrap()).map(|qos| (qos.durability, qos.keep));
+        assert_eq!(kept("UMAA::SO::XReport"), Some((Durability::Persistent, Keep::Last(1))));
+        assert_eq!(kept("UMAA::SO::XCommandStatus"), Some((Durability::Persistent, Keep::All)));
+        assert_eq!(kept("afrl.cmasi.AirVehicleState"), Some((Durability::Persistent, Keep::All)));
     }
 }

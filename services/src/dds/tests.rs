@@ -253,7 +253,7 @@ fn a_confirmation_waits_for_every_reliable_reader_and_for_no_longer_than_it_may(
     assert_eq!(pair.writers.confirm(source, 9, &sample, pair.now + Duration::from_secs(5)), None);
     let (_, confirmed) = pair.writers.due(pair.now + Duration::from_secs(5));
     let missing = vec![EntityId::new(5).unwrap()];
-    let outcome = Err(crate::service::Unconfirmed { missing });
+    let outcome = Err(crate::service::Unconfirmed::Missing { missing });
     assert_eq!(confirmed, [Confirmed { source, number: 9, outcome }]);
     // A reader that is not heard for its lease is waited for no longer.
     let sample = pair.write(1, Change::Put);

@@ -1,11 +1,14 @@
 //! What the sources of this node have written, who reads it, and how far each reader has it.
 
+mod records;
+
 use super::Participant;
 use super::history::History;
 use super::qos::Qos;
 use crate::service::Unconfirmed;
-use aldis_envelope::aldis::dds::{Ask, Confirm, History as Told, Readers, Retained, StreamName, Streams};
+use aldis_envelope::aldis::dds::{Ask, Confirm, History as Told, Readers, StreamName, Streams};
 use aldis_envelope::{Address, EntityId, Envelope, Label, Monotonic, Source};
+use records::retained;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
@@ -87,6 +90,8 @@ pub struct Writers {
     streams: BTreeMap<StreamName, Stream>,
     readers: BTreeMap<Participant, Reader>,
     waiting: Vec<Waiting>,
+    /// Records of the journal that hold nothing any more.
+    forgotten: Vec<u64>,
     /// Nothing is due before this; it is looked up anew only then.
     wake: Option<Monotonic>,
 }
@@ -117,6 +122,7 @@ impl Writers {
         if stream.readers.is_empty() {
             stream.history.settle(stream.last);
         }
+        stream.history.take_forgotten(&mut self.forgotten);
         stream.history.take_shed()
     }
 
@@ -272,6 +278,7 @@ impl Writers {
         let counted = stream.readers.iter().filter_map(|p| self.readers.get(p));
         let floor = counted.map(|reader| reader.has(name)).min().unwrap_or(stream.last);
         stream.history.settle(floor);
+        stream.history.take_forgotten(&mut self.forgotten);
     }
 
     fn heard(&mut self, now: Monotonic, from: Participant) {
@@ -307,7 +314,7 @@ impl Writers {
         let mut confirmed: Vec<_> = gone.into_iter().flat_map(|p| self.remove(p)).collect();
         confirmed.extend(self.waiting.extract_if(.., |waiting| waiting.deadline <= now).map(|waiting| {
             let missing: BTreeSet<EntityId> = waiting.missing.iter().map(|p| p.node).collect();
-            let outcome = Err(Unconfirmed { missing: missing.into_iter().collect() });
+            let outcome = Err(Unconfirmed::Missing { missing: missing.into_iter().collect() });
             Confirmed { source: waiting.source, number: waiting.number, outcome }
         }));
         confirmed
@@ -372,17 +379,5 @@ pub(super) fn name_of(envelope: &Envelope) -> Option<StreamName> {
             Some(StreamName { source: label.source(), topic: topic.clone() })
         }
         _ => None,
-    }
-}
-
-fn retained(sample: &Envelope) -> Retained {
-    let instance = sample.message.instance.as_ref();
-    Retained {
-        sequence: sample.stamp.sequence,
-        source_time: sample.stamp.source_time,
-        change: sample.message.change,
-        hash: instance.map(|instance| instance.hash),
-        key: instance.and_then(|instance| instance.key.as_ref()).map(|key| key.to_vec()),
-        content: sample.message.content.to_vec(),
     }
 }

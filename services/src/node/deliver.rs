@@ -1,13 +1,13 @@
 //! Where messages go: to services here, to peers of bridges, out on the bus.
 
 use super::{Node, Origin, Passed, Work, sharing};
-use crate::dds::Step;
+use crate::dds::{Durability, Step};
 use crate::event::{BridgeId, Effect, PeerId, PublisherId};
 use crate::labels::{Entry, Standing};
 use crate::service::{Input, Level, refusal};
 use aldis_envelope::{
     Address, Call, Change, Envelope, KeyHash, Label, Now, Priority, Refusal, Role, ServiceId, Space, Stamp,
-    aldis,
+    Wall, aldis,
 };
 use std::sync::Arc;
 
@@ -20,11 +20,35 @@ const INSTANCE_USES_MIN: u32 = 8;
 /// a topic of thousands of instances is faster with few.
 const INSTANCE_PUBLISHERS_MAX: usize = 64;
 
+/// What is said of a message that waited for the disk.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Kept {
+    /// When its source sent it.
+    pub(super) source_time: Wall,
+    /// Its record in the journal; none where it only waited behind others.
+    pub(super) record: Option<u64>,
+}
+
 impl Node {
-    /// A message that starts here: it is stamped, and goes everywhere.
+    /// A message that starts here: it goes everywhere, once it is on disk where its topic says so.
     pub(super) fn route(&mut self, now: Now, work: Work, effects: &mut Vec<Effect>) {
+        let place = self.label(&work.message.label);
+        if self.labels.entry(place).persistent || self.keeping.is_waiting() {
+            return self.keep(now, place, work, effects);
+        }
+        self.hand_on(now, place, work, None, effects);
+    }
+
+    /// Stamps a message that starts here and sends it everywhere.
+    pub(super) fn hand_on(
+        &mut self,
+        now: Now,
+        place: usize,
+        work: Work,
+        kept: Option<Kept>,
+        effects: &mut Vec<Effect>,
+    ) {
         let Work { origin, message, confirm, passed } = work;
-        let place = self.label(&message.label);
         let (outgoing, publish) = self.outgoing(place);
         let (sequence, skipped) = self.outbound.next(outgoing);
         let (node, boot) = (self.entity(), self.config.boot);
@@ -33,7 +57,7 @@ impl Node {
                 node,
                 boot,
                 sequence,
-                source_time: now.wall,
+                source_time: kept.map_or(now.wall, |kept| kept.source_time),
                 lifespan_left_ms: None,
                 priority: Priority::Data,
                 skipped,
@@ -48,6 +72,9 @@ impl Node {
         let qos = self.labels.entry(place).qos;
         if let Some(qos) = qos {
             self.counters.shed_retained += self.sharing.writers.wrote(now.monotonic, qos, publish, &envelope);
+            if let Some(record) = kept.and_then(|kept| kept.record) {
+                self.sharing.writers.recorded(&envelope, record);
+            }
         }
         self.deliver_here(now, origin, place, &envelope, effects);
         if let Some((number, within)) = confirm {
@@ -322,7 +349,7 @@ impl Node {
         Some(publisher)
     }
 
-    fn outgoing(&mut self, place: usize) -> (usize, bool) {
+    pub(super) fn outgoing(&mut self, place: usize) -> (usize, bool) {
         let entry = self.labels.entry(place);
         let outgoing = match entry.outgoing {
             Some(outgoing) => outgoing,
@@ -354,6 +381,9 @@ impl Node {
         let services = (0..self.services.len()).filter(|&i| self.services[i].receives(address)).collect();
         let bridges =
             (0..self.bridges.len()).filter(|&i| self.bridges[i].exports(label)).map(BridgeId).collect();
+        let qos = self.sharing.topics.of(address).filter(|_| label.is_broadcast());
+        let persistent =
+            qos.is_some_and(|qos| qos.durability == Durability::Persistent) && self.journals(label.source());
         self.labels.insert(Entry {
             label: label.clone(),
             services,
@@ -361,7 +391,8 @@ impl Node {
             links: self.links.naming(label),
             publish: matches(&self.config.export),
             import: matches(&self.config.import),
-            qos: self.sharing.topics.of(address).filter(|_| label.is_broadcast()),
+            qos,
+            persistent,
             among_nodes: sharing::is_among_nodes(label),
             outgoing: None,
             incoming: None,

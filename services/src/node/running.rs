@@ -184,6 +184,9 @@ impl Node {
 
     pub(super) fn deadline(&mut self, now: Now, effects: &mut Vec<Effect>) {
         self.armed = None;
+        if self.ending {
+            return self.end_when_kept(now, effects);
+        }
         for ended in self.calls.expire(now.monotonic) {
             self.call_ended(now, ended, effects);
         }
@@ -245,6 +248,11 @@ impl Node {
             self.run(now, place, Input::Shutdown, effects);
             self.settle(now, effects);
         }
+        self.end_when_kept(now, effects);
+    }
+
+    /// The last words are said: the node is gone.
+    pub(super) fn end(&mut self, now: Now, effects: &mut Vec<Effect>) {
         self.leave(now, effects);
         if self.bus_is_open {
             let running: Vec<_> = self.sources_running().collect();

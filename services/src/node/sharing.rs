@@ -84,6 +84,7 @@ impl Node {
         }
         let mut kept: Vec<Envelope> = Vec::new();
         let wanted = |address: &Address| hosted.receives(address);
+        let former = self.former(place);
         for (address, history) in self.sharing.writers.histories() {
             if wanted(address) {
                 kept.extend(history.samples().filter(|s| s.message.label.source() != own).cloned());
@@ -94,7 +95,11 @@ impl Node {
                 kept.extend(history.samples().cloned());
             }
         }
-        if hosted.follows_bus() && self.alive.is_known() {
+        let follows_bus = hosted.follows_bus();
+        for envelope in &former {
+            self.run(now, place, Input::Recovered(envelope), effects);
+        }
+        if follows_bus && self.alive.is_known() {
             for source in self.alive.all().collect::<Vec<_>>() {
                 self.run(now, place, Input::Token(source, true), effects);
             }

@@ -1,5 +1,6 @@
 //! Whole nodes in the simulator: what a fleet must see.
 
+mod journal;
 mod links;
 mod sharing;
 
@@ -50,6 +51,7 @@ impl Service for Probe {
             Input::Job(number, result) => format!("job {number} {}", result.is_ok()),
             Input::HistoryComplete(complete) => format!("history {complete}"),
             Input::Confirmed(number, outcome) => format!("confirmed {number} {outcome:?}"),
+            Input::Recovered(envelope) => format!("recovered {}", message_line(envelope)),
             Input::Shutdown => "shutdown".into(),
             _ => String::new(),
         };

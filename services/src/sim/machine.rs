@@ -57,6 +57,8 @@ pub(super) struct Storage {
     pub(super) under_way: Option<DiskEffect>,
     /// Operations take so long.
     pub(super) latency: (Duration, Duration),
+    /// What the journal has told before the node starts.
+    pub(super) told: Vec<Event>,
 }
 
 pub(super) struct Machine {

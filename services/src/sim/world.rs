@@ -11,7 +11,7 @@ use super::observe::{Checker, Facts, Observation, Seen, Violation};
 use super::trace::Trace;
 use crate::event::{BridgeId, Effect, Event, PeerEvent, PeerId};
 use crate::node::{Node, NodeConfig};
-use aldis_envelope::{BootId, Keys, Label, Monotonic, Now};
+use aldis_envelope::{Keys, Label, Monotonic, Now};
 use bus::BusFaults;
 use bytes::Bytes;
 use std::collections::BTreeMap;
@@ -116,28 +116,32 @@ impl World {
         let node = Node::new(config.clone())?;
         self.machines.push(Machine::new(config, Clocks { born: self.now, ..Clocks::default() }));
         let place = self.machines.len() - 1;
-        self.start(place, node);
+        self.start(place, node, Vec::new());
         Ok(NodeHandle(place))
     }
 
-    /// The node of a machine begins a life.
-    fn start(&mut self, place: usize, node: Node) {
+    /// The node of a machine begins a life, with what its journal has told.
+    fn start(&mut self, place: usize, mut node: Node, mut events: Vec<Event>) {
         let machine = &mut self.machines[place];
-        machine.node = Some(node);
         machine.clocks.born = self.now;
-        let boot = machine.config.boot;
+        let mut effects = Vec::new();
+        node.handle(machine.clocks.at(self.now), &mut events, &mut effects);
+        machine.config.boot = node.boot();
+        let boot = node.boot();
+        machine.node = Some(node);
         self.observe(place, Seen::Started(boot));
-        self.handle(place, Vec::new());
+        self.took_place(place, effects);
         self.open_links(place);
         self.open_bus(NodeHandle(place));
     }
 
-    /// Starts the node of a machine with a new boot id.
-    fn start_again(&mut self, place: usize, boot: BootId) {
-        self.machines[place].config.boot = boot;
-        match Node::new(self.machines[place].config.clone()) {
-            Ok(node) => self.start(place, node),
-            Err(why) => self.violate("the world", format!("{}: {why}", NodeHandle(place))),
+    /// Starts the node of a machine again, with a new boot id where no journal gives it one.
+    fn start_again(&mut self, place: usize, told: Option<Vec<Event>>) {
+        self.machines[place].config.boot.0 += 1;
+        match (Node::new(self.machines[place].config.clone()), told) {
+            (Ok(node), None) => self.start(place, node, Vec::new()),
+            (Ok(node), Some(told)) => self.start(place, node.with_journal(), told),
+            (Err(why), _) => self.violate("the world", format!("{}: {why}", NodeHandle(place))),
         }
     }
 
@@ -281,6 +285,11 @@ impl World {
         let Some(node) = &mut machine.node else { return };
         let mut effects = Vec::new();
         node.handle(machine.clocks.at(self.now), &mut events, &mut effects);
+        self.took_place(place, effects);
+    }
+
+    /// What came of a node's turn.
+    fn took_place(&mut self, place: usize, effects: Vec<Effect>) {
         for fact in self.facts.take() {
             self.observe(place, Seen::Fact(&*fact));
         }
@@ -308,6 +317,7 @@ impl World {
                 let when = machine.clocks.when(at) + Duration::from_nanos(2);
                 self.put(when.max(self.now), place, Arrival::Deadline);
             }
+            Effect::Append(number, batch) => self.append(place, number, &batch),
             Effect::Exit => machine.exited = true,
             Effect::Say(note) => self.observe(place, Seen::Said(&note)),
             Effect::Transmit(link, carrier, frame) => self.transmit(place, link, carrier, frame),

@@ -14,8 +14,8 @@ const PACKAGES: [(&str, &[&str]); 3] = [
 /// The modules of `services`, low to high. A module imports from lower rows alone, never from its own row, so that no
 /// circle can be.
 const LAYERS: [&[&str]; 9] = [
-    &["service"],
-    &["allow", "calls", "counters", "dds", "journal", "notes", "streams"],
+    &["journal", "service"],
+    &["allow", "calls", "counters", "dds", "notes", "streams"],
     &["link", "map", "plan", "umaa"],
     &["event"],
     &["bridge", "labels"],

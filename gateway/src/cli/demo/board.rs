@@ -5,6 +5,8 @@ use aldis_envelope::aldis::NodeStatus;
 use aldis_envelope::umaa::ErrorCondition;
 use aldis_envelope::{EntityId, Monotonic};
 use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 /// The boats.
@@ -14,8 +16,10 @@ pub(super) const SILENCED: u64 = 403;
 
 /// The one whose autopilot is contended for.
 pub(super) const CONTENDED: u64 = 401;
+/// The one whose arbiter crashes.
+pub(super) const CRASHING: u64 = 402;
 
-/// How the contest for the autopilot goes.
+/// How control of an autopilot goes.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Control {
     /// Who holds it, and until when by the boat's clock, as its arbiter reports.
@@ -30,6 +34,8 @@ pub(super) struct Control {
     pub(super) rejected: u64,
     /// Times that it ended in any other way.
     pub(super) otherwise: u64,
+    /// Times that it went on to its end over a crash of its arbiter.
+    pub(super) recovered: u64,
 }
 
 /// What shore knows of one boat.
@@ -55,8 +61,12 @@ pub(super) struct Boat {
 pub(super) struct Board {
     pub(super) now: Monotonic,
     pub(super) boats: BTreeMap<EntityId, Boat>,
-    /// Who controls the autopilot.
+    /// Who controls the autopilot that is contended for.
     pub(super) control: Control,
+    /// Who controls the one whose arbiter crashes.
+    pub(super) recovery: Control,
+    /// How often it has.
+    pub(super) crashes: Arc<AtomicU64>,
     /// The boat that is silenced now.
     pub(super) silenced: Option<u64>,
     /// What is known of bad links, where the boats are behind some.
@@ -77,10 +87,21 @@ pub(super) struct Outcome {
     pub(super) calls_failed_elsewhere: u64,
     pub(super) control: Control,
     pub(super) linked: Linked,
+    pub(super) recovery: Control,
+    pub(super) crashes: u64,
     pub(super) ran: Duration,
 }
 
 impl Board {
+    /// How control of a boat's autopilot goes; none where nobody asks for it.
+    pub(super) fn control_of(&mut self, boat: EntityId) -> Option<&mut Control> {
+        match boat.get() {
+            CONTENDED => Some(&mut self.control),
+            CRASHING => Some(&mut self.recovery),
+            _ => None,
+        }
+    }
+
     /// The result, from what shore saw and what the nodes counted.
     pub(super) fn result(&self, statuses: &[NodeStatus], ran: Duration) -> Outcome {
         let counted = |name: &str| {
@@ -98,6 +119,8 @@ impl Board {
             calls_failed_elsewhere: self.failed_elsewhere,
             control: self.control.clone(),
             linked: self.linked.clone(),
+            recovery: self.recovery.clone(),
+            crashes: self.crashes.load(Ordering::Relaxed),
             ran,
         }
     }

@@ -1,6 +1,6 @@
-//! Two consumers on shore that contend for the autopilot of one boat (UMAA ResourceAllocation).
+//! Consumers on shore that ask for the autopilots of boats (UMAA ResourceAllocation); two contend for one.
 
-use super::board::{Board, CONTENDED, Control};
+use super::board::{Board, Control};
 use crate::cli::member::Desk;
 use aldis_envelope::umaa::{
     CommandState, CommandStatusReason, DurationSeconds, NoExecutionStatus, ResourceAllocationCommand,
@@ -8,6 +8,7 @@ use aldis_envelope::umaa::{
 use aldis_envelope::{DateTime, EntityId, Guid, Guids, Monotonic, Now, Prefix, ServiceId, Source};
 use aldis_services::umaa::command::{Consumer, ConsumerSettings, Outcome, Told};
 use aldis_services::{Input, Outbox};
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -17,6 +18,8 @@ pub(super) const RESOURCE: &str = "autopilot";
 pub(super) const PLANNER: u64 = 101;
 /// The one of higher priority.
 pub(super) const OPERATOR: u64 = 102;
+/// The one that asks for the boat whose arbiter crashes.
+pub(super) const SURVEYOR: u64 = 103;
 
 /// How a contender goes about it.
 #[derive(Debug, Clone, Copy)]
@@ -44,9 +47,12 @@ pub(super) struct Contender {
     board: Arc<Mutex<Board>>,
     consumer: Consumer<ResourceAllocationCommand>,
     arbiter: Guid,
+    boat: EntityId,
     resource: Guid,
     habit: Habit,
     next: Option<Monotonic>,
+    /// How often an arbiter had crashed when control was given.
+    crashes: u64,
 }
 
 impl Contender {
@@ -60,7 +66,7 @@ impl Contender {
         let arbiter = guids.of_service(Source::new(boat, ServiceId::ALLOCATION));
         let consumer = Consumer::new(source, guids.clone(), ConsumerSettings::default());
         let resource = guids.of_resource(boat, RESOURCE);
-        Self { board, consumer, arbiter, resource, habit, next: None }
+        Self { board, consumer, arbiter, boat, resource, habit, next: None, crashes: 0 }
     }
 
     /// What its service has to subscribe to.
@@ -88,13 +94,23 @@ impl Contender {
     }
 
     fn told(&mut self, now: Now, told: Told<NoExecutionStatus>) {
+        let boat = self.boat;
         match told {
-            Told::State { state: CommandState::Executing, .. } => self.board().control.given += 1,
+            Told::State { state: CommandState::Executing, .. } => {
+                let mut board = self.board();
+                let crashes = board.crashes.load(Ordering::Relaxed);
+                board.control_of(boat).into_iter().for_each(|control| control.given += 1);
+                drop(board);
+                self.crashes = crashes;
+            }
             Told::Ended { outcome, .. } => {
                 self.next = Some(now.monotonic + self.habit.pause);
                 let mut board = self.board();
-                let counter = board.control.of(&outcome);
-                *counter += 1;
+                let has_crashed = board.crashes.load(Ordering::Relaxed) > self.crashes;
+                if let Some(control) = board.control_of(boat) {
+                    *control.of(&outcome) += 1;
+                    control.recovered += u64::from(has_crashed && outcome == Outcome::Completed);
+                }
             }
             _ => {}
         }
@@ -111,7 +127,7 @@ impl Desk for Contender {
             // The boat must be there: before its first word nobody answers.
             Input::HistoryComplete(_) => self.next = Some(now.monotonic + self.habit.pause),
             Input::Deadline if self.next.is_some_and(|at| at <= now.monotonic) => {
-                let is_there = self.board().boats.keys().any(|boat| boat.get() == CONTENDED);
+                let is_there = self.board().boats.contains_key(&self.boat);
                 if is_there {
                     self.ask(now, out);
                 } else {

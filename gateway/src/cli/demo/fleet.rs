@@ -1,7 +1,8 @@
 //! The nodes of the demo.
 
-use super::board::{BOATS, Board, CONTENDED, SILENCED};
+use super::board::{BOATS, Board, CONTENDED, CRASHING, SILENCED};
 use super::control::{self, Contender, Habit};
+use super::crashing::crashing;
 use super::linked;
 use super::shore::ShoreDesk;
 use crate::cli::exit::Failure;
@@ -15,8 +16,8 @@ use aldis_envelope::{EntityId, GuidForm, Guids, Prefix, ServiceId, Source};
 use aldis_services::sim::link::Profile;
 use aldis_services::{ServiceSpec, track};
 use std::net::TcpListener;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, mpsc};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::time::Duration;
 
 /// The name of the fleet.
@@ -57,7 +58,8 @@ impl Fleet {
         services.extend(contenders(board, &guids, entity)?);
         let Some(profile) = link else {
             let shore = start(&shore_text(port), services)?;
-            let boats = BOATS.iter().map(|&boat| start(&boat_text(boat, port), Vec::new()));
+            let crashes = board.lock().unwrap_or_else(PoisonError::into_inner).crashes.clone();
+            let boats = BOATS.iter().map(|&boat| start_boat(boat, port, &crashes));
             return Ok(Self {
                 shore,
                 boats: boats.collect::<Result<_, _>>()?,
@@ -104,24 +106,39 @@ impl Fleet {
     }
 }
 
-/// The planner wants the autopilot most of the time; the operator goes before it, now and then.
+/// The planner wants the autopilot most of the time; the operator goes before it, now and then. The surveyor has a boat to itself.
 fn contenders(
     board: &Arc<Mutex<Board>>,
     guids: &Guids,
     shore: EntityId,
 ) -> Result<Vec<ServiceSpec>, Failure> {
-    let boat = EntityId::new(CONTENDED).map_err(failed)?;
     let seconds = Duration::from_secs_f64;
     let habits = [
-        (control::PLANNER, Habit { span: seconds(2.0), pause: seconds(0.5) }),
-        (control::OPERATOR, Habit { span: seconds(1.5), pause: seconds(3.7) }),
+        (control::PLANNER, CONTENDED, Habit { span: seconds(2.0), pause: seconds(0.5) }),
+        (control::OPERATOR, CONTENDED, Habit { span: seconds(1.5), pause: seconds(3.7) }),
+        // It has control nearly always, so that a crash of the arbiter finds a command.
+        (control::SURVEYOR, CRASHING, Habit { span: seconds(5.0), pause: seconds(0.2) }),
     ];
-    let contender = |(service, habit): (u64, Habit)| {
+    let contender = |(service, boat, habit): (u64, u64, Habit)| {
+        let boat = EntityId::new(boat).map_err(failed)?;
         let source = Source::new(shore, ServiceId::new(service).map_err(failed)?);
         let contender = Contender::new(board.clone(), guids, source, boat, habit);
         Ok(desk_service(source, contender.subscriptions(), contender))
     };
     habits.into_iter().map(contender).collect()
+}
+
+/// A boat; the arbiter of one of them crashes.
+fn start_boat(boat: u64, port: u16, crashes: &Arc<AtomicU64>) -> Result<Member, Failure> {
+    let config = Config::parse("demo", &boat_text(boat, port))?;
+    let outside = runtime::outside(&config).map_err(failed)?;
+    let mut node = runtime::node_config(&config);
+    let arbiters = node
+        .services
+        .iter_mut()
+        .filter(|spec| boat == CRASHING && spec.source.service == ServiceId::ALLOCATION);
+    arbiters.for_each(|spec| *spec = crashing(spec.clone(), crashes));
+    Member::start(node, outside)
 }
 
 fn start(text: &str, services: Vec<ServiceSpec>) -> Result<Member, Failure> {
@@ -147,12 +164,13 @@ fn boat_text(boat: u64, port: u16) -> String {
          [bus]\nmode = \"client\"\nconnect = [\"tcp/127.0.0.1:{port}\"]\n[health]\nreport_period_ms = 1000\n\
          [[service]]\nkind = \"track\"\nservice = 100\nlatitude_deg = {:.4}\nlongitude_deg = -71.35\n\
          speed_m_per_s = {:.1}\nturn_rate_deg_per_s = {:.1}\nrate_hz = 10.0\n\
-         [[resource]]\nname = \"{}\"\npriorities = [\"eid1sid{}\", \"eid1sid{}\"]\n",
+         [[resource]]\nname = \"{}\"\npriorities = [\"eid1sid{}\", \"eid1sid{}\", \"eid1sid{}\"]\n",
         41.40 + place * 0.02,
         4.0 + place * 2.0,
         place - 2.0,
         control::RESOURCE,
         control::PLANNER,
         control::OPERATOR,
+        control::SURVEYOR,
     )
 }

@@ -1,12 +1,22 @@
 //! The live table in the terminal.
 
-use super::board::{Board, CONTENDED};
+use super::board::{Board, CONTENDED, CRASHING, Control};
 use crate::cli::print_line;
 use std::fmt::Write;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// After this long without a word a boat is shown as silent: five times its period.
 const SILENT_AFTER: Duration = Duration::from_millis(500);
+
+/// Who holds an autopilot, and until when.
+fn held(control: &Control) -> String {
+    match &control.holder {
+        None => "nobody".to_owned(),
+        Some((holder, None)) => holder.clone(),
+        Some((holder, Some(end))) => format!("{holder} until {end}"),
+    }
+}
 
 /// Draws the table over the last one.
 pub(super) fn draw(board: &mut Board, ran: Duration) {
@@ -46,16 +56,23 @@ pub(super) fn draw(board: &mut Board, ran: Duration) {
             let _ = writeln!(text, "      last failed call: {}", boat.last_failure);
         }
     }
-    let control = &board.control;
-    let held = match &control.holder {
-        None => "nobody".to_owned(),
-        Some((holder, None)) => holder.clone(),
-        Some((holder, Some(end))) => format!("{holder} until {end}"),
-    };
+    let (control, recovery) = (&board.control, &board.recovery);
     let _ = writeln!(
         text,
-        "\nautopilot of boat {CONTENDED}: held by {held}; given {}, expired {}, taken over {}, rejected {}",
-        control.given, control.expired, control.taken_over, control.rejected
+        "\nautopilot of boat {CONTENDED}: held by {}; given {}, expired {}, taken over {}, rejected {}",
+        held(control),
+        control.given,
+        control.expired,
+        control.taken_over,
+        control.rejected
+    );
+    let _ = writeln!(
+        text,
+        "autopilot of boat {CRASHING}: held by {}; given {}, its arbiter crashed {} times and went on with {} commands",
+        held(recovery),
+        recovery.given,
+        board.crashes.load(Ordering::Relaxed),
+        recovery.recovered
     );
     if let Some(silenced) = board.silenced {
         let _ = writeln!(

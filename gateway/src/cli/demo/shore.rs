@@ -151,7 +151,7 @@ impl ShoreDesk {
                 (boat.latitude, boat.longitude) = (position.latitude, position.longitude);
             }
         } else if message.label.descriptor() == ResourceAllocationReport::NAME {
-            self.reported(message);
+            self.reported(entity, message);
         } else if message.change == Change::Put
             && let Ok(report) = umaa::decode::<HealthReport>(&message.content)
         {
@@ -165,16 +165,17 @@ impl ShoreDesk {
         }
     }
 
-    /// Who controls the autopilot, as its arbiter says.
-    fn reported(&self, message: &Message) {
+    /// Who controls a boat's autopilot, as its arbiter says.
+    fn reported(&self, boat: EntityId, message: &Message) {
         let report = umaa::decode::<ResourceAllocationReport>(&message.content).ok();
         let session =
             report.and_then(|report| report.control_info.iter().find_map(|info| info.control_session));
         let named = |guid: Guid| self.guids.service(guid).map_or_else(|| guid.to_string(), |s| s.to_string());
-        self.board().control.holder = session.map(|session| {
+        let holder = session.map(|session| {
             let end = session.end_time.map(|end| Wall::from(end).to_string());
             (named(session.controlling_consumer), end)
         });
+        self.board().control_of(boat).into_iter().for_each(|control| control.holder.clone_from(&holder));
     }
 
     fn ended(&mut self, now: Now, id: CallId, outcome: Result<(), Refusal>) {

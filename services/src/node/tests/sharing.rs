@@ -6,7 +6,11 @@ use aldis_envelope::{Change, Instance};
 const REPORT: &str = "UMAA::SO::T::TReport";
 
 /// Sends a sample of an instance for each word of a message: `7` puts it, `-7` disposes it, `?7` wants its confirmation.
-fn writer(of: Source, topic: &'static str, trigger: &'static [&'static str]) -> (ServiceSpec, Seen) {
+pub(super) fn writer(
+    of: Source,
+    topic: &'static str,
+    trigger: &'static [&'static str],
+) -> (ServiceSpec, Seen) {
     let act: Act = Arc::new(move |input, out| {
         let Input::Message(envelope) = input else { return };
         let text = String::from_utf8(envelope.message.content.to_vec()).unwrap();
@@ -34,19 +38,19 @@ fn writing(world: &mut World, entity: u64, topic: &'static str) -> (NodeHandle, 
     (node, told)
 }
 
-fn say(world: &mut World, node: NodeHandle, words: &str) {
+pub(super) fn say(world: &mut World, node: NodeHandle, words: &str) {
     let message = Bytes::from(format!("go$lmcp|go||0|0${words}"));
     world.give(node, Event::Peer(BridgeId(0), PeerId(1), PeerEvent::Message(message)));
     world.run_for(Duration::from_millis(20));
 }
 
-fn reading(world: &mut World, entity: u64, topic: &'static [&'static str]) -> (NodeHandle, Seen) {
+pub(super) fn reading(world: &mut World, entity: u64, topic: &'static [&'static str]) -> (NodeHandle, Seen) {
     let (spec, seen) = probe(source(entity, 100), topic, idle());
     (world.add(config(&[entity], vec![spec])).unwrap(), seen)
 }
 
 /// The contents that a probe got, and whatever else it was told.
-fn contents(probe: &Seen) -> Vec<String> {
+pub(super) fn contents(probe: &Seen) -> Vec<String> {
     let short = |line: &String| match line.strip_prefix("eid1sid5 UMAA::SO::T::TReport b") {
         Some(content) => content.trim_matches('"').to_owned(),
         None => line.clone(),
@@ -116,7 +120,7 @@ fn a_delivery_is_confirmed_by_every_reader_or_the_missing_ones_are_named() {
     world.close_bus(readers[1]);
     say(&mut world, node, "?2");
     world.run_for(Duration::from_secs(6));
-    assert_eq!(of(&told)[1..], ["confirmed 2 Err(Unconfirmed { missing: [401] })"]);
+    assert_eq!(of(&told)[1..], ["confirmed 2 Err(Missing { missing: [401] })"]);
     // Its lease has run out: nobody waits for it.
     world.run_for(Duration::from_secs(6));
     say(&mut world, node, "?3");

@@ -10,6 +10,8 @@ use std::collections::BTreeMap;
 #[derive(Debug, Default)]
 pub(super) struct Boots {
     last: BTreeMap<NodeHandle, BootId>,
+    /// The last boot id of each, and whether what it is counted from is on disk.
+    boots: BTreeMap<NodeHandle, (BootId, bool)>,
     /// Whether the number of the present start is on disk.
     kept: BTreeMap<NodeHandle, bool>,
 }
@@ -33,11 +35,15 @@ impl Checker for Boots {
                 self.kept.insert(node, true);
             }
             Seen::Journal(JournalEvent::Unusable(why)) => return Err(format!("{node}: {why}")),
-            Seen::Started(boot) if self.last.get(&node) != Some(boot) => {
-                return Err(format!(
-                    "{node} starts as {boot:?}, its journal said {:?}",
-                    self.last.get(&node)
-                ));
+            Seen::Journal(JournalEvent::Written { .. }) => {
+                self.boots.entry(node).and_modify(|(_, is_counted)| *is_counted = true);
+            }
+            Seen::Started(boot) => {
+                let (last, is_counted) = self.boots.get(&node).copied().unwrap_or((BootId(0), false));
+                if is_counted && *boot < last {
+                    return Err(format!("{node} starts as {boot:?} after {last:?}"));
+                }
+                self.boots.insert(node, (*boot, is_counted));
             }
             _ => {}
         }

@@ -4,7 +4,6 @@ use super::super::disk::DiskFaults;
 use super::bus::BusFaults;
 use super::{Arrival, NodeHandle, Seen, World};
 use crate::event::Event;
-use aldis_envelope::BootId;
 use std::time::Duration;
 
 impl World {
@@ -51,9 +50,8 @@ impl World {
             return;
         }
         machine.is_on = true;
-        let next = BootId(machine.config.boot.0 + 1);
         if !self.open_journal(node.0) {
-            self.start_again(node.0, next);
+            self.start_again(node.0, None);
         }
     }
 

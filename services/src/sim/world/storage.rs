@@ -3,9 +3,9 @@
 use super::super::disk::{DiskFaults, SimDisk};
 use super::super::machine::{Clocks, Machine, Storage};
 use super::{Arrival, NodeHandle, Seen, World};
+use crate::event::Event;
 use crate::journal::{Batch, Journal, JournalConfig, JournalEvent, JournalOutput};
 use crate::node::{Node, NodeConfig};
-use aldis_envelope::BootId;
 use std::time::Duration;
 
 impl World {
@@ -24,22 +24,23 @@ impl World {
         let mut machine = Machine::new(config, Clocks { born: self.now, ..Clocks::default() });
         let (disk, config) = (SimDisk::default(), journal);
         let journal = Journal::new(config.clone());
-        machine.storage = Some(Storage { disk, config, journal, under_way: None, latency });
+        machine.storage = Some(Storage { disk, config, journal, under_way: None, latency, told: Vec::new() });
         machine.is_on = false;
         self.machines.push(machine);
         Ok(NodeHandle(self.machines.len() - 1))
     }
 
-    /// Appends a batch to a machine's journal. None where it has none, or is down.
-    pub fn append(&mut self, to: NodeHandle, batch: &Batch) -> Option<u64> {
-        let machine = &mut self.machines[to.0];
-        machine.node.as_ref()?;
-        let storage = machine.storage.as_mut()?;
+    /// Gives a batch of a machine's node to its journal.
+    pub(super) fn append(&mut self, place: usize, number: u64, batch: &Batch) {
+        let Some(storage) = self.machines[place].storage.as_mut() else { return };
         let mut out = JournalOutput::default();
-        let number = storage.journal.append(batch, &mut out);
+        let numbered = storage.journal.append(batch, &mut out);
         storage.journal.flush(&mut out);
-        self.journal_output(to.0, out);
-        Some(number)
+        self.journal_output(place, out);
+        if numbered != number {
+            let what = format!("{} numbers a batch {number}, its journal {numbered}", NodeHandle(place));
+            self.violate("the world", what);
+        }
     }
 
     /// Sets what a machine's disk does wrong, and how many bytes fit on it.
@@ -53,6 +54,7 @@ impl World {
     pub(super) fn open_journal(&mut self, place: usize) -> bool {
         let Some(storage) = &mut self.machines[place].storage else { return false };
         storage.journal = Journal::new(storage.config.clone());
+        storage.told.clear();
         let mut out = JournalOutput::default();
         storage.journal.open(&mut out);
         self.journal_output(place, out);
@@ -102,9 +104,21 @@ impl World {
         }
         for event in out.events {
             self.observe(place, Seen::Journal(&event));
-            if let JournalEvent::RecoveredAll(recovered) = &event {
-                self.start_again(place, BootId(recovered.start));
-            }
+            self.journal_told(place, event);
+        }
+    }
+
+    /// What a journal tells reaches the node in a turn of its own; a node that starts gets all that stands.
+    fn journal_told(&mut self, place: usize, event: JournalEvent) {
+        if self.is_running(NodeHandle(place)) {
+            return self.put(self.now, place, Arrival::Event(Event::Journal(event)));
+        }
+        let Some(storage) = &mut self.machines[place].storage else { return };
+        let is_all = matches!(event, JournalEvent::RecoveredAll(_) | JournalEvent::Unusable(_));
+        storage.told.push(Event::Journal(event));
+        if is_all {
+            let told = std::mem::take(&mut storage.told);
+            self.start_again(place, Some(told));
         }
     }
 }

@@ -265,7 +265,10 @@ impl Bus {
             Arrival::GiveUp(sequence) => {
                 if let Some(waiting) = self.confirming.remove(&sequence) {
                     let missing = waiting.missing.iter().map(|reader| reader.entity).collect();
-                    self.give(waiting.writer, Input::Confirmed(waiting.number, Err(Unconfirmed { missing })));
+                    self.give(
+                        waiting.writer,
+                        Input::Confirmed(waiting.number, Err(Unconfirmed::Missing { missing })),
+                    );
                 }
             }
             Arrival::Token(other, alive) if alive != self.silent.contains(&(other, to)) => {

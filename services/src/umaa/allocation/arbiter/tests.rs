@@ -344,6 +344,75 @@ fn an_arbiter_that_lost_its_process_keeps_who_is_in_control_until_the_same_end()
     sea.is_clean();
 }
 
+/// What a consumer was told of one of its sessions, and of the others.
+fn of_session(all: Vec<Told<umaa::NoExecutionStatus>>, of: Guid) -> (String, String) {
+    let (own, others) = all.into_iter().partition(|told| match told {
+        Told::State { session, .. } | Told::Ended { session, .. } => *session == of,
+        _ => false,
+    });
+    (told(own), told(others))
+}
+
+#[test]
+fn a_session_that_is_replaced_before_it_had_control_never_executes() {
+    let mut sea = sea();
+    let one = allocating(&mut sea.bus, captain(1));
+    sea.bus.silence(arbiter(), steersman());
+    let first = sea.allocate(&one, captain(1), None);
+    sea.run(1.0);
+    sea.allocate(&one, captain(1), None);
+    sea.run(1.0);
+    sea.bus.heal(arbiter(), steersman());
+    sea.run(1.0);
+    let (of_first, of_second) = of_session(one.take(), first);
+    assert_eq!(of_first, "ISSUED COMMANDED FAILED/INTERRUPTED");
+    assert_eq!((of_second.as_str(), sea.holder()), (ALL, Some(guid(captain(1)))));
+    sea.is_lawful();
+}
+
+#[test]
+fn of_two_sessions_that_wait_when_the_arbiter_starts_again_one_executes_once_it_is_reported() {
+    let mut sea = sea();
+    let one = allocating(&mut sea.bus, captain(1));
+    sea.bus.crash(arbiter());
+    let first = sea.allocate(&one, captain(1), None);
+    sea.run(0.5);
+    sea.allocate(&one, captain(1), None);
+    sea.run(0.5);
+    sea.bus.start(arbiter());
+    for _ in 0..1000 {
+        sea.run(0.001);
+        let executing = sea.bus.retained(<ResourceAllocationCommand as umaa::Command>::STATUS_NAME);
+        let states = executing.iter().filter_map(|envelope| {
+            let status =
+                umaa::decode::<umaa::CommandStatus<ResourceAllocationCommand>>(&envelope.message.content);
+            status.ok().map(|status| status.command_status)
+        });
+        if states.into_iter().any(|state| state == umaa::CommandState::Executing) {
+            assert_eq!(sea.holder(), Some(guid(captain(1))), "nobody executes what is not reported");
+        }
+    }
+    let (of_first, of_second) = of_session(one.take(), first);
+    assert_eq!((of_first.as_str(), of_second.as_str()), ("ISSUED COMMANDED FAILED/INTERRUPTED", ALL));
+    sea.is_lawful();
+}
+
+#[test]
+fn who_was_in_control_before_a_restart_goes_before_who_came_meanwhile() {
+    let mut sea = sea();
+    let (one, two) = (allocating(&mut sea.bus, captain(1)), allocating(&mut sea.bus, captain(2)));
+    sea.allocate(&two, captain(2), None);
+    sea.run(1.0);
+    sea.bus.crash(arbiter());
+    sea.allocate(&one, captain(1), None);
+    sea.run(0.5);
+    sea.bus.start(arbiter());
+    sea.run(1.0);
+    assert_eq!((told(two.take()).as_str(), sea.holder()), (ALL, Some(guid(captain(2)))));
+    assert_eq!(told(one.take()), "ISSUED COMMANDED FAILED/RESOURCE_REJECTED");
+    sea.is_lawful();
+}
+
 #[test]
 fn control_whose_consumer_has_gone_is_cleared_at_the_start_of_the_arbiter() {
     let mut sea = sea();

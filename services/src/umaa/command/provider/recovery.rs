@@ -125,7 +125,20 @@ impl<C: Command, E: Executor<C>, A: Admission> Provider<C, E, A> {
             return;
         }
         self.stage = Stage::Serving;
-        for (_, (command, writer)) in std::mem::take(&mut self.waiting) {
+        // What was executed goes before what waited, or a resource would be given away behind its holder's back.
+        let rank = |command: &C| match self
+            .past
+            .left
+            .get(&command.header().session_id)
+            .and_then(|left| left.state)
+        {
+            Some((_, CommandState::Executing)) => 0,
+            Some((_, CommandState::Commanded)) => 1,
+            _ => 2,
+        };
+        let mut waiting: Vec<_> = std::mem::take(&mut self.waiting).into_values().collect();
+        waiting.sort_by_key(|(command, _)| (rank(command), command.header().time_stamp));
+        for (command, writer) in waiting {
             self.take(now, command, writer, out);
         }
         self.past.wait_ends = Some(now.monotonic + self.settings.orphans_wait);
