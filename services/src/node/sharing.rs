@@ -22,6 +22,8 @@ const ANNOUNCE_AGAIN: Duration = Duration::from_millis(500);
 const LEASE: Duration = Duration::from_secs(10);
 /// How long a service waits for what others retain.
 const HISTORY_WITHIN: Duration = Duration::from_secs(5);
+/// How much of it for programs that are no node, such as the command line's: foreign ones may never tell.
+const PROGRAMS_WITHIN: Duration = Duration::from_secs(1);
 
 /// A service that waits for what others retain.
 #[derive(Debug, Clone, Copy)]
@@ -30,6 +32,8 @@ struct Starting {
     /// The first announcement that speaks for it.
     number: u64,
     deadline: Monotonic,
+    /// Until when programs that are no node are waited for; none where they are not any more.
+    programs_by: Option<Monotonic>,
 }
 
 /// What a node keeps for its writers and readers.
@@ -57,7 +61,8 @@ impl Sharing {
     }
 
     pub(super) fn next_deadline(&self) -> Option<Monotonic> {
-        let starting = self.starting.iter().map(|starting| starting.deadline).min();
+        let due = |starting: &Starting| starting.programs_by.unwrap_or(starting.deadline);
+        let starting = self.starting.iter().map(due).min();
         let others = [self.writers.next_deadline(), self.reading.next_deadline(), self.announce_at, starting];
         others.into_iter().flatten().min()
     }
@@ -109,8 +114,9 @@ impl Node {
             self.run(now, place, Input::Message(envelope), effects);
         }
         let (number, deadline) = (self.sharing.number, now.monotonic + HISTORY_WITHIN);
+        let programs_by = Some(now.monotonic + PROGRAMS_WITHIN);
         self.sharing.starting.retain(|starting| starting.place != place);
-        self.sharing.starting.push(Starting { place, number, deadline });
+        self.sharing.starting.push(Starting { place, number, deadline, programs_by });
     }
 
     /// Who reads what has changed, or who is on the bus: all are told.
@@ -178,6 +184,13 @@ impl Node {
         let answered = |node| self.sharing.answered.get(&node).is_some_and(|&answered| answered >= number);
         let mut others = self.alive.nodes().filter(|node| *node != own).peekable();
         self.alive.is_known() && others.peek().is_some() && others.all(answered)
+    }
+
+    /// Whether all others that show a token have answered an announcement: programs that are no node, too.
+    fn programs_answered(&self, number: u64) -> bool {
+        let answered = |node| self.sharing.answered.get(&node).is_some_and(|&answered| answered >= number);
+        let others = self.alive.all().map(|source| source.entity);
+        others.filter(|entity| !self.config.entities.contains(entity)).all(answered)
     }
 
     /// Something that another node tells this one.
@@ -300,11 +313,13 @@ impl Node {
             }
         }
         let starting = std::mem::take(&mut self.sharing.starting);
-        for service in starting {
+        for mut service in starting {
+            service.programs_by = service.programs_by.filter(|by| *by > now.monotonic);
             let prefixes: Vec<_> = self.services[service.place].subscribed().cloned().collect();
             let complete = prefixes.is_empty()
                 || self.bus_is_open
                     && self.everybody_answered(service.number)
+                    && (service.programs_by.is_none() || self.programs_answered(service.number))
                     && self.sharing.reading.is_complete(&prefixes);
             if complete || service.deadline <= now.monotonic {
                 self.run(now, service.place, Input::HistoryComplete(complete), effects);

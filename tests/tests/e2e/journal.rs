@@ -12,7 +12,7 @@ durability = \"persistent\"
 
 [[resource]]
 name = \"autopilot\"
-priorities = [\"eid9000sid100\"]
+priorities = [\"eid9001sid100\"]
 ";
 
 fn start_vehicle(site: &Site) -> Node {
@@ -62,17 +62,17 @@ fn an_arbiter_that_is_killed_keeps_who_is_in_control_and_the_lists_that_were_set
     let site = Site::new();
     let _shore = site.start_shore();
     let vehicle = start_vehicle(&site);
-    let set = site.aldis(&["priority", "400:autopilot", "eid9000sid100", "eid9000sid105", "--json"]);
+    let set = site.aldis(&["priority", "400:autopilot", "eid9001sid100", "eid9000sid105", "--json"]);
     assert_eq!(set.code, Some(0), "{set:?}");
     let state = || site.aldis(&["priority", "--json"]).json().first().cloned().unwrap_or_default();
     std::thread::scope(|scope| {
-        let holding = scope.spawn(|| site.aldis(&["allocate", "400:autopilot", "--json"]));
-        until("the autopilot is held", || (state()["holder"] == "eid9000sid100").then_some(()));
+        let holding = scope.spawn(|| site.aldis(&["allocate", "400:autopilot", "--as", "9001", "--json"]));
+        until("the autopilot is held", || (state()["holder"] == "eid9001sid100").then_some(()));
         vehicle.crash();
         let _vehicle = start_vehicle(&site);
-        until("the autopilot is held again", || (state()["holder"] == "eid9000sid100").then_some(()));
+        until("the autopilot is held again", || (state()["holder"] == "eid9001sid100").then_some(()));
         assert_eq!(state()["priorities"].as_array().unwrap().len(), 2, "{}", state());
-        let released = site.aldis(&["release"]);
+        let released = site.aldis(&["release", "--as", "9001"]);
         assert_eq!(released.code, Some(0), "{released:?}");
         let holding = holding.join().unwrap();
         let states: Vec<_> =

@@ -179,6 +179,27 @@ fn without_a_bus_history_is_waited_for_in_vain_but_not_for_ever() {
 }
 
 #[test]
+fn history_is_complete_when_programs_that_are_no_node_have_told_theirs_too() {
+    for seed in 0..20 {
+        let mut world = World::new(seed, (MILLISECOND, 40 * MILLISECOND));
+        world.add(config(&[1], Vec::new())).unwrap();
+        let say: Act = Arc::new(|input, out| {
+            if matches!(input, Input::Started) {
+                let label = Label::broadcast(ContentType::Umaa, Name::new(REPORT).unwrap(), out.source());
+                out.send(Message::new(Arc::new(label), Bytes::from_static(b"7")));
+            }
+        });
+        let (program, _) = probe(source(9000, 100), &[], say);
+        world.add(NodeConfig { services: vec![program], ..config(&[9000], Vec::new()) }).unwrap();
+        world.run_for(Duration::from_secs(1));
+        let (_, got) = reading(&mut world, 400, &["UMAA::SO::T"]);
+        world.run_for(Duration::from_millis(800));
+        let expected = [format!("eid9000sid100 {REPORT} b\"7\""), "history true".into()];
+        assert_eq!(contents(&got), expected, "seed {seed}");
+    }
+}
+
+#[test]
 fn a_volatile_topic_has_no_late_joiners() {
     let mut world = world();
     let (node, _) = writing(&mut world, 1, "UMAA::SO::T::LogReport");
