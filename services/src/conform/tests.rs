@@ -1,6 +1,7 @@
 //! A run in which every clause is held, and runs in which one of them is broken.
 
 mod clean;
+mod crossing;
 mod planted;
 mod scene;
 mod watched;

@@ -1,5 +1,7 @@
 //! One command from its first sign to its last.
 
+mod crossing;
+
 use super::{Role, SessionId, Step};
 use crate::conform::Clause;
 use crate::conform::ledger::{Debt, Ledger};
@@ -28,6 +30,8 @@ pub(super) struct Session {
     /// When it came to a terminal state.
     ended: Option<Monotonic>,
     last_status: Option<Sample>,
+    /// The command as it was acknowledged last: it may come later than that.
+    last_ack: Option<Sample>,
     acknowledged: bool,
     /// Who spoke about the command has unregistered, or contact is lost: its next life may go on, or begin anew.
     provider_gone: bool,
@@ -52,6 +56,7 @@ impl Session {
             state: None,
             ended: None,
             last_status: None,
+            last_ack: None,
             acknowledged: false,
             provider_gone: false,
             may_return: false,
@@ -93,6 +98,7 @@ impl Session {
             Clause::ConsumerCleanUp | Clause::ProviderCleanUp => bounds.clean_up,
             Clause::ExecutionStatus => bounds.follow,
             Clause::Correlated | Clause::CleanUpOrder | Clause::CancelAsked => bounds.slack,
+            Clause::UpdatedOnly | Clause::AckFirst | Clause::AckMatches => bounds.slack,
             _ => bounds.answer,
         };
         ledger.owe(self.debt(clause), within, format!("session {}: {text}", self.id.1));
@@ -126,10 +132,14 @@ impl Session {
         if self.before.len() > BEFORE_MAX {
             self.before.pop_front();
         }
-        if self.ended.is_none() {
-            (self.updates, self.acknowledged) = (self.updates + 1, false);
+        if ledger.forgive(&self.debt(Clause::UpdatedOnly)) {
+            // Its answer was here sooner.
+            ledger.held(Clause::UpdatedOnly);
+        } else if self.ended.is_none() {
+            self.updates += 1;
             self.owe(Clause::UpdateAnswered, ledger, "its update is not answered");
         }
+        self.comes_after_its_ack(sample, ledger);
     }
 
     /// A command that was not there before, or one that reuses the session of another.
@@ -143,6 +153,9 @@ impl Session {
             for clause in [Clause::ProviderCleanUp, Clause::CancelAnswered] {
                 ledger.forgive(&self.debt(clause));
             }
+        }
+        if !self.acknowledged {
+            self.comes_after_its_ack(sample, ledger);
         }
         if self.state.is_none() && !retained {
             self.owe(Clause::Answered, ledger, "its command is not answered");
@@ -163,10 +176,11 @@ impl Session {
         }
         if self.command.is_some() {
             let matches = is_now || self.before.contains(&acknowledged);
-            self.judge(Clause::AckMatches, matches, ledger, || {
+            self.judge_crossing(Clause::AckMatches, matches, ledger, || {
                 format!("it acknowledges {}", acknowledged.value())
             });
         }
+        self.last_ack = Some(acknowledged);
     }
 
     /// An execution status.
@@ -239,14 +253,12 @@ impl Session {
             });
         }
         if legal && from.is_some() && to == "ISSUED" {
-            self.judge(Clause::UpdatedOnly, self.updates > 0, ledger, || {
+            self.judge_crossing(Clause::UpdatedOnly, self.updates > 0, ledger, || {
                 "back to ISSUED without an update".to_owned()
             });
         }
         if to == "COMMANDED" && legal && self.updates == 0 {
-            self.judge(Clause::AckFirst, self.acknowledged, ledger, || {
-                "COMMANDED before it is acknowledged".to_owned()
-            });
+            self.judge_ack_first(ledger);
         }
         if to == "CANCELED" {
             if self.disposed {

@@ -68,13 +68,12 @@ fn a_rule_that_a_peer_breaks_is_found() {
             let (fleet, python) = (&fleet, &python);
             scope.spawn(move || provider(fleet, python, &(501 + number).to_string(), fault));
         }
-        scope.spawn(|| {
-            let _arbiter = start_arbiter(&fleet);
-            for (fault, _) in OF_CONSUMERS {
-                consumer(&fleet, &python, fault);
-            }
-        });
     });
+    // Afterwards: these are readers of the reports above, and those who vanish are waited for.
+    let _arbiter = start_arbiter(&fleet);
+    for (fault, _) in OF_CONSUMERS {
+        consumer(&fleet, &python, fault);
+    }
     let report = watch.report();
     let planted: BTreeSet<_> = OF_PROVIDERS.iter().chain(&OF_CONSUMERS).map(|(_, clause)| *clause).collect();
     let broken = clauses(&report, "broken");

@@ -2,6 +2,7 @@
 
 use super::Foreign;
 use crate::harness::{Fleet, Running};
+use aldis_tests::until;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -46,9 +47,13 @@ fn allocate_and_hold(fleet: &Fleet, provider: &Foreign) -> Running {
     consumer
 }
 
+/// Has the running `aldis allocate` give the resource back. A busy machine may tell of nobody at first.
 fn release(fleet: &Fleet) {
-    let released = fleet.aldis(&["release", "--json"]);
-    assert_eq!(released.code, Some(0), "{released:?}");
+    until("the resource is released", || {
+        let released = fleet.aldis(&["release", "--json"]);
+        assert!(matches!(released.code, Some(0 | 3)), "{released:?}");
+        (released.code == Some(0)).then_some(())
+    });
 }
 
 pub(super) fn all_figures(fleet: &Fleet, python: &Path) {
