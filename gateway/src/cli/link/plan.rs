@@ -81,10 +81,11 @@ impl FromStr for Load {
 /// What the node of a configuration makes by itself.
 fn own_loads(config: &Config) -> Vec<Load> {
     let own = config.entities.own();
-    let tracks = config.services.iter().map(|Service::Track(configured)| {
+    let tracks = config.services.iter().filter_map(|service| {
+        let Service::Track(configured) = service else { return None };
         let motion = configured.motion(own);
         let bytes = track::state_bytes(configured.source(own), &motion);
-        Load { descriptor: track::DESCRIPTOR.into(), bytes, per_second: motion.rate_hz, instances: 1 }
+        Some(Load { descriptor: track::DESCRIPTOR.into(), bytes, per_second: motion.rate_hz, instances: 1 })
     });
     let parts = BUILT_IN + config.services.len() as u32 + config.bridges.len() as u32;
     let per_second = f64::from(parts) / config.health.report_period().as_secs_f64();
