@@ -13,11 +13,9 @@ use std::sync::Arc;
 
 /// How many publishers are declared at the most: Zenoh keeps a route for each. Rarer keys are put on undeclared.
 pub(super) const PUBLISHERS_MAX: usize = 2_000;
-/// An instance gets a publisher with its use after so many: the instances of a command live for a handful, and to declare
-/// and keep a key for each costs more than it brings.
+/// An instance gets a publisher after so many uses: those of a command live for a handful, and a key costs more than it brings.
 const INSTANCE_USES_MIN: u32 = 8;
-/// How many instances of one stream get a publisher. Zenoh looks a key that is not declared up among all that are, so that
-/// a topic of thousands of instances is faster with few.
+/// How many instances of one stream get a publisher: Zenoh looks a key that is not declared up among all that are.
 const INSTANCE_PUBLISHERS_MAX: usize = 64;
 
 /// What is said of a message that waited for the disk.

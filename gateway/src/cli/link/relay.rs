@@ -51,8 +51,6 @@ pub(crate) struct Running {
     thread: Option<JoinHandle<()>>,
     /// Where it listens.
     pub(crate) address: SocketAddr,
-    /// What passed.
-    pub(crate) passed: Arc<Passed>,
 }
 
 impl Running {
@@ -115,7 +113,7 @@ impl Relay {
     /// # Errors
     /// What the system says of the socket or the thread.
     pub(crate) fn spawn(mut self) -> io::Result<Running> {
-        let (address, passed) = (self.address()?, self.passed());
+        let address = self.address()?;
         let (stop, cut) = (Arc::new(AtomicBool::new(false)), self.cut.clone());
         let asked = stop.clone();
         let run = move || {
@@ -124,7 +122,7 @@ impl Relay {
             }
         };
         let thread = Some(std::thread::Builder::new().name("relay".into()).spawn(run)?);
-        Ok(Running { stop, cut, thread, address, passed })
+        Ok(Running { stop, cut, thread, address })
     }
 
     /// Relays until it is to stop.

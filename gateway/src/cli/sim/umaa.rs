@@ -131,7 +131,7 @@ impl Umaa {
         let mut rows = Vec::new();
         let mut missed = 0;
         for violation in violations() {
-            let finding = violation.run(seed).map_err(Failure::Failed)?;
+            let finding = violation.find(seed).map_err(Failure::Failed)?;
             let exact = finding.is_exact(violation);
             missed += usize::from(!exact);
             let Violation { name, clause, .. } = violation;

@@ -14,8 +14,6 @@ pub(super) enum Act {
     AcknowledgesOther,
     HidesExecution,
     UpdatesWithoutTime,
-    UpdatesTooLate,
-    IgnoresUpdate,
     IgnoresCommand,
     CancelsUnasked,
     HearsCancelLate,
@@ -39,7 +37,6 @@ impl Act {
             Self::HidesExecution => arrangement.steersman,
             Self::UnregistersReport | Self::NamesSecondHolder | Self::ReportsLate => arrangement.arbiter,
             Self::UpdatesWithoutTime
-            | Self::UpdatesTooLate
             | Self::LeavesCommand
             | Self::UnregistersCommand
             | Self::UsesSessionTwice => arrangement.lamplighter,

@@ -24,8 +24,6 @@ pub(super) struct Saboteur {
     act: Act,
     /// How often it was done; shared with who wants to know.
     count: Arc<AtomicU64>,
-    /// The instance that it is done to, where more than one message is of it.
-    victim: Option<KeyHash>,
     /// The commands that were put, and those that have ended.
     known: BTreeSet<KeyHash>,
     last_command: Option<RudderCommand>,
@@ -40,7 +38,6 @@ impl Saboteur {
         Self {
             act,
             count,
-            victim: None,
             known: BTreeSet::new(),
             last_command: None,
             held: Vec::new(),
@@ -229,16 +226,6 @@ impl Saboteur {
                 self.done();
                 Vec::new()
             }
-            (Change::Dispose, _) if self.act == Act::UpdatesTooLate && !self.is_done() => {
-                match self.last_command.clone().filter(|_| self.victim == Some(hash)) {
-                    Some(command) => {
-                        self.done();
-                        let late = RudderCommand { time_stamp: next(command.time_stamp), ..command };
-                        vec![umaa::put(label, &late), message]
-                    }
-                    None => vec![message],
-                }
-            }
             _ => vec![message],
         }
     }
@@ -260,13 +247,7 @@ impl Saboteur {
             self.done();
             return false;
         }
-        let is_put = envelope.message.change == Change::Put;
-        let is_new = is_put && self.known.insert(hash);
         match self.act {
-            Act::IgnoresUpdate if is_put && !is_new => {
-                self.done();
-                false
-            }
             Act::HearsCancelLate if envelope.message.change == Change::Dispose => {
                 if self.passing.take_if(|passing| *passing == hash).is_some() {
                     return true;
@@ -294,16 +275,6 @@ impl Tamper for Saboteur {
         let Input::Message(envelope) = input else { return true };
         match envelope.message.label.descriptor() {
             RudderCommand::NAME => self.hears_command(now, envelope),
-            RudderCommand::STATUS_NAME if self.act == Act::UpdatesTooLate => {
-                if let Some(status) = read::<Status>(&envelope.message)
-                    && status.command_status == CommandState::Completed
-                    && let Some(command) = &self.last_command
-                    && command.session_id == status.session_id
-                {
-                    self.victim = Some(command.instance().hash);
-                }
-                true
-            }
             _ => true,
         }
     }

@@ -54,7 +54,7 @@ fn the_monitor_and_the_machines_have_the_same_transitions() {
 #[test]
 fn planted_breaches_are_found_and_nothing_else() {
     for violation in violations() {
-        let finding = violation.run(1).unwrap();
+        let finding = violation.find(1).unwrap();
         assert!(finding.is_exact(violation), "{violation:?}: {finding:?}");
     }
 }
