@@ -3,6 +3,7 @@
 mod administration;
 mod bridges;
 mod deliver;
+mod life;
 mod running;
 mod sharing;
 

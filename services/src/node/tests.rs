@@ -1,5 +1,7 @@
 //! Whole nodes in the simulator: what a fleet must see.
 
+mod bridges;
+mod life;
 mod sharing;
 
 use super::*;
@@ -99,6 +101,8 @@ fn config(entities: &[u64], services: Vec<ServiceSpec>) -> NodeConfig {
 
 fn bridge(entity: u64) -> BridgeSpec {
     BridgeSpec {
+        peer: None,
+        self_generated: false,
         source: source(entity, 20),
         name: "uxas".into(),
         dialect: Dialect::OpenUxas,
