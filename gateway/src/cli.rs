@@ -23,6 +23,7 @@ mod route;
 mod run;
 mod subscribe;
 mod telemetry;
+mod uxas;
 mod within;
 
 use clap::{Parser, Subcommand};
@@ -94,6 +95,8 @@ enum Command {
     Assign(assign::Assign),
     /// Find a way around zones, with turns no tighter than the vehicle makes.
     Route(route::Route),
+    /// Bring configurations of OpenUxAS over.
+    Uxas(uxas::Uxas),
     /// Measure this machine, side by side with the limit.
     Bench(bench::Bench),
 }
@@ -123,6 +126,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Lmcp(args) => args.run(),
         Command::Assign(args) => args.run(),
         Command::Route(args) => args.run(),
+        Command::Uxas(args) => args.run(),
         Command::Bench(args) => args.run(),
     };
     match done {

@@ -8,7 +8,7 @@ mod wiring;
 pub(crate) use core::{Core, Shared};
 pub(crate) use wiring::{Outside, node_config, outside};
 
-use crate::bridge::uxas_tcp;
+use crate::bridge;
 use aldis_services::event::BridgeId;
 use aldis_services::{Event, Node, NodeConfig};
 use std::sync::Arc;
@@ -47,11 +47,10 @@ pub(crate) fn run(
 ) -> Result<(), RuntimeError> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let keys = aldis_envelope::Keys::new(&config.fleet);
-    let dialects = config.bridges.iter().map(|bridge| bridge.dialect).collect();
     let node = Node::new(config).map_err(RuntimeError::Config)?;
     let local = LocalSet::new();
     local.block_on(&runtime, async move {
-        let (core, ends) = Core::build(node, dialects, tokio::runtime::Handle::current());
+        let (core, ends) = Core::build(node, tokio::runtime::Handle::current());
         drive(core, ends, outside, keys, control).await;
     });
     runtime.shutdown_timeout(Duration::from_secs(1));
@@ -85,7 +84,7 @@ async fn drive(
     tasks.spawn_local(job_results(core.clone(), jobs));
     tasks.spawn_local(bus_task::drain(core.clone(), inbox.clone(), paused.clone()));
     for (i, endpoint) in outside.bridges.into_iter().enumerate() {
-        tasks.spawn_local(uxas_tcp::serve(core.clone(), BridgeId(i), endpoint, paused.clone()));
+        tasks.spawn_local(bridge::serve(core.clone(), BridgeId(i), endpoint, paused.clone()));
     }
     let (closed, mut is_closed) = watch::channel(false);
     let bus = bus_task::keep(core.clone(), inbox, keys, outside.bus, silenced, closed);

@@ -36,7 +36,7 @@ fn assert_mistake(text: &str, at: (usize, usize), message: &str, cure: &str) {
 fn a_mistake_shows_file_line_column_snippet_and_cure() {
     let error = mistakes(&format!("{TOP}{BRIDGE}{LISTEN}dialekt = \"slides\"\n"));
     let expected = "  × unknown field `dialekt`, expected one of `name`, `service`, `listen`, `connect`, `dialect`, `import`, `export`,
-  │ `message_bytes_max`, `queue_messages_max`, `stall_timeout_ms`
+  │ `message_bytes_max`, `queue_messages_max`, `stall_timeout_ms`, `peer`, `self_generated`
    ╭─[node.toml:8:1]
  7 │ listen = \"127.0.0.1:5556\"
  8 │ dialekt = \"slides\"
@@ -259,12 +259,13 @@ fn defaults() {
     assert_eq!(config.routing.import, [Prefix::all()]);
     assert_eq!(config.health.report_period(), Duration::from_secs(5));
     assert_eq!((config.log.level, config.log.format), (Level::Info, LogFormat::Text));
-    let Bridge::UxasTcp(bridge) = &config.bridges[0];
-    assert_eq!(bridge.endpoint, Endpoint::Listen("127.0.0.1:5556".parse().unwrap()));
+    let Bridge::UxasTcp(tcp) = &config.bridges[0] else { panic!("{:?}", config.bridges) };
+    assert_eq!(tcp.endpoint, Endpoint::Listen("127.0.0.1:5556".parse().unwrap()));
+    let bridge = &tcp.common;
     assert_eq!((bridge.message_bytes_max, bridge.queue_messages_max), (16 << 20, 8192));
     assert_eq!(bridge.stall_timeout(), Duration::from_secs(5));
     assert_eq!((&bridge.import, &bridge.export), (&vec![Prefix::all()], &vec![Prefix::all()]));
-    let Service::Track(track) = &config.services[0];
+    let Service::Track(track) = &config.services[0] else { panic!("a track was written") };
     assert_eq!((track.heading_deg, track.speed_m_per_s, track.rate_hz), (0.0, 0.0, 1.0));
     assert_eq!(track.source(config.entities.own()).to_string(), "eid400sid100");
     assert_eq!(track.motion(config.entities.own()).latitude_deg, 59.0);

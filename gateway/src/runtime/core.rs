@@ -2,10 +2,10 @@
 //! are carried out on the spot, so that a message passes without a change of thread or task.
 
 use super::Ends;
-use crate::bridge::uxas_tcp::Peers;
+use crate::bridge::Peers;
 use crate::bus::{Bus, BusError};
 use crate::clock::Clock;
-use aldis_envelope::{Dialect, Monotonic};
+use aldis_envelope::Monotonic;
 use aldis_services::service::{Job, Level, Note};
 use aldis_services::{Effect, Event, Node};
 use std::collections::VecDeque;
@@ -81,16 +81,12 @@ pub(crate) struct Core {
 
 impl Core {
     /// A core and what the tasks around it follow.
-    pub(super) fn build(
-        node: Node,
-        dialects: Vec<Dialect>,
-        runtime: tokio::runtime::Handle,
-    ) -> (Shared, Ends) {
+    pub(super) fn build(node: Node, runtime: tokio::runtime::Handle) -> (Shared, Ends) {
         let (timer, timer_end) = watch::channel(None);
         let (paused, paused_end) = watch::channel(false);
         let (exited, exited_end) = watch::channel(false);
         let (jobs, jobs_end) = mpsc::unbounded_channel();
-        let peers = Peers::new(dialects);
+        let peers = Peers::default();
         let (clock, effects) = (Clock::start(), Vec::new());
         let wake = Arc::new(Notify::new());
         let core = Self {

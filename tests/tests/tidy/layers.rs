@@ -18,7 +18,7 @@ const LAYERS: [&[&str]; 8] = [
     &["allow", "calls", "counters", "dds", "event", "journal", "notes", "streams"],
     &["link", "map", "plan", "umaa"],
     &["bridge", "labels"],
-    &["conform", "health", "log", "track"],
+    &["conform", "health", "log", "manager", "player", "track"],
     &["host", "registry"],
     &["node"],
     &["sim"],
