@@ -258,6 +258,13 @@ fn messages(element: &Element, import: &mut Import<'_>) {
             import.remark(child.line, format!("`{}` names no `MessageFileName`", child.name));
             continue;
         };
+        // OpenUxAS passes over a file that it cannot read.
+        if let Ok(bytes) = std::fs::read(directory.join(file))
+            && let Err(why) = aldis_envelope::lmcp::read_xml(&bytes)
+        {
+            import.remark(child.line, format!("`{file}` is left out: {why}"));
+            continue;
+        }
         import.unread(
             child,
             &["MessageFileName", "MessageKey", "SendTime_ms", "SendPeriod_ms", "NumberTimesToSend"],
