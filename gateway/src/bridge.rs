@@ -18,6 +18,7 @@ use tokio::sync::watch;
 
 /// What a bridge opens.
 #[derive(Debug, Clone)]
+#[allow(clippy::enum_variant_names, reason = "other worlds than UxAS will come")]
 pub(crate) enum Endpoint {
     /// The stream form over TCP.
     UxasTcp(uxas_tcp::Endpoint),

@@ -158,11 +158,7 @@ impl Service for Manager {
         match input {
             // All services of the configuration start before the first deadline.
             Input::Started => self.startup = Some(now.monotonic),
-            Input::Deadline => {
-                if self.startup.take().is_some() {
-                    self.tell(&StartupComplete::default(), out);
-                }
-            }
+            Input::Deadline if self.startup.take().is_some() => self.tell(&StartupComplete::default(), out),
             Input::Message(envelope) if envelope.message.call.is_some() => {
                 let what = envelope.message.label.descriptor().to_owned();
                 out.refuse(envelope, Refusal::NotUnderstood(what));

@@ -26,6 +26,7 @@ pub(crate) const BRIDGE_SERVICES: RangeInclusive<u32> = 20..=99;
 /// One `[[bridge]]`, by its `kind`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
+#[allow(clippy::enum_variant_names, reason = "other worlds than UxAS will come")]
 pub(crate) enum Bridge {
     /// The UxAS stream form over TCP.
     UxasTcp(UxasTcp),

@@ -93,7 +93,7 @@ fn element(start: &BytesStart<'_>, line: usize) -> Result<Element, (usize, Strin
     for attribute in start.attributes() {
         let wrong = |why: quick_xml::Error| (line, format!("an attribute of `{name}`: {why}"));
         let attribute = attribute.map_err(|why| wrong(why.into()))?;
-        let value = attribute.normalized_value(XmlVersion::Implicit1_0).map_err(|why| wrong(why.into()))?;
+        let value = attribute.normalized_value(XmlVersion::Implicit1_0).map_err(wrong)?;
         attributes.push(Attribute { name: attribute.key.into_inner().to_owned(), value: value.into_owned() });
     }
     Ok(Element { name, line, attributes, children: Vec::new() })
