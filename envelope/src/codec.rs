@@ -5,3 +5,4 @@ pub mod multipart;
 pub mod native;
 pub mod recording;
 pub mod stream;
+pub mod zmtp;

@@ -28,6 +28,7 @@ mod sim;
 mod simulate;
 mod subscribe;
 mod telemetry;
+mod uxas;
 mod within;
 
 use clap::{Parser, Subcommand};
@@ -109,6 +110,8 @@ enum Command {
     Sim(sim::Sim),
     /// Plan a scenario and let simulated vehicles do it, until all tasks are complete.
     Simulate(simulate::Simulate),
+    /// Bring configurations of OpenUxAS over.
+    Uxas(uxas::Uxas),
     /// Measure this machine, side by side with the limit.
     Bench(bench::Bench),
 }
@@ -143,6 +146,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Queue(args) => args.run(),
         Command::Sim(args) => args.run(),
         Command::Simulate(args) => args.run(),
+        Command::Uxas(args) => args.run(),
         Command::Bench(args) => args.run(),
     };
     match done {

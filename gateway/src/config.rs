@@ -18,14 +18,16 @@ mod locator;
 mod read;
 mod resource;
 mod schema;
+mod send_messages;
 mod service;
 mod text;
 mod topic;
 mod uxas;
+pub(crate) mod uxas_file;
 
 pub(crate) use acl::acl;
 pub(crate) use allow::Allow;
-pub(crate) use bridge::{Bridge, Endpoint};
+pub(crate) use bridge::{Bridge, Check, Endpoint, Framing, Sockets};
 pub(crate) use bus::Bus;
 pub(crate) use entities::{Entities, Operators};
 pub(crate) use error::ConfigError;
@@ -112,10 +114,24 @@ impl Config {
         let file = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|e| ConfigError::unreadable(&file, &e))?;
         let mut config = Self::parse(&file, &text)?;
-        let directory = path.parent().unwrap_or(Path::new(""));
-        config.bus.resolve(directory);
-        config.links.iter_mut().for_each(|link| link.resolve(directory));
-        config.journal.iter_mut().for_each(|journal| journal.resolve(directory));
+        let base = path.parent().unwrap_or(Path::new(""));
+        config.bus.resolve(base);
+        config.links.iter_mut().for_each(|link| link.resolve(base));
+        config.journal.iter_mut().for_each(|journal| journal.resolve(base));
+        read::read_files(&mut config, &file, &text, base)?;
+        Ok(config)
+    }
+
+    /// Reads the configuration that a file of OpenUxAS becomes.
+    ///
+    /// # Errors
+    /// [`ConfigError`] where what it becomes is wrong, with places in that.
+    pub(crate) fn of_uxas(path: &Path, imported: &uxas_file::Imported) -> Result<Self, ConfigError> {
+        let file = format!("what becomes of {}", path.display());
+        let mut config = Self::parse(&file, &imported.toml)?;
+        let base = path.parent().unwrap_or(Path::new(""));
+        config.bus.resolve(base);
+        read::read_files(&mut config, &file, &imported.toml, base)?;
         Ok(config)
     }
 

@@ -8,7 +8,7 @@ mod wiring;
 pub(crate) use core::{Core, Shared};
 pub(crate) use wiring::{Outside, node_config, outside};
 
-use crate::bridge::uxas_tcp;
+use crate::bridge;
 use crate::carrier::{serial, udp};
 use crate::journal::{JournalError, JournalThread};
 use aldis_services::event::BridgeId;
@@ -57,7 +57,6 @@ pub(crate) fn run(
 ) -> Result<(), RuntimeError> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let keys = aldis_envelope::Keys::new(&config.fleet);
-    let dialects = config.bridges.iter().map(|bridge| bridge.dialect).collect();
     for (link, keys) in config.links.iter_mut().zip(&outside.link_keys) {
         link.link.keys.clone_from(keys);
     }
@@ -70,7 +69,7 @@ pub(crate) fn run(
     let node = if journal.is_some() { node.with_journal() } else { node };
     let local = LocalSet::new();
     local.block_on(&runtime, async move {
-        let (core, ends) = Core::build(node, journal, dialects, tokio::runtime::Handle::current());
+        let (core, ends) = Core::build(node, journal, tokio::runtime::Handle::current());
         if let Some(told) = told {
             tokio::task::spawn_local(journal_events(core.clone(), told));
         }
@@ -108,7 +107,7 @@ async fn drive(
     tasks.spawn_local(job_results(core.clone(), jobs));
     tasks.spawn_local(bus_task::drain(core.clone(), inbox.clone(), paused.clone()));
     for (i, endpoint) in outside.bridges.into_iter().enumerate() {
-        tasks.spawn_local(uxas_tcp::serve(core.clone(), BridgeId(i), endpoint, paused.clone()));
+        tasks.spawn_local(bridge::serve(core.clone(), BridgeId(i), endpoint, paused.clone()));
     }
     for port in outside.udp {
         tasks.spawn_local(udp::serve(core.clone(), port));

@@ -26,6 +26,10 @@ pub struct BridgeSpec {
     pub queue_messages_max: usize,
     /// How long a peer that takes nothing holds up others.
     pub stall_timeout: Duration,
+    /// The one peer that this bridge leads to, where it has a name: what came from it by any bridge never returns to it.
+    pub peer: Option<String>,
+    /// Whether everything that enters becomes the bridge's own, as OpenUxAS has it by default.
+    pub self_generated: bool,
 }
 
 counters! {
@@ -37,6 +41,8 @@ counters! {
     exported,
     /// Messages whose source `0|0` was assigned.
     sources_assigned,
+    /// Messages whose source was replaced by the bridge's own.
+    sources_rewritten,
     /// Messages refused because they are malformed.
     refused_malformed,
     /// Messages refused because of a source that this node does not speak for.
@@ -47,6 +53,12 @@ counters! {
     frames_bad,
     /// Bytes outside frames.
     bytes_skipped,
+    /// Messages of one frame where seven are spoken, or of several where one is.
+    framing_wrong,
+    /// Messages over the limit.
+    too_large,
+    /// Messages that were not written to a peer because it had not subscribed to them.
+    not_subscribed,
     /// Messages for a peer that took nothing for too long.
     shed_stalled,
     /// Messages for a peer whose queue was full.
@@ -59,10 +71,18 @@ counters! {
 #[derive(Debug, Default)]
 struct Peer {
     name: String,
+    gives_alone: bool,
     credit: usize,
     queue: VecDeque<(Arc<Label>, Bytes)>,
     waiting_since: Option<Monotonic>,
     stalled: bool,
+}
+
+/// A message of a peer as it came.
+#[derive(Debug)]
+pub(crate) enum Incoming {
+    Delimited(Bytes),
+    Parts(Vec<Bytes>),
 }
 
 /// What became of a message for a peer.
@@ -86,6 +106,7 @@ pub(crate) struct Bridge {
 impl Bridge {
     pub(crate) fn new(spec: BridgeSpec, entities: &[EntityId]) -> Self {
         let importer = Importer::new(spec.source, entities.to_vec(), spec.import.clone());
+        let importer = if spec.self_generated { importer.self_generated() } else { importer };
         let state = "starting".to_owned();
         Self { spec, counters: BridgeCounters::default(), state, importer, peers: BTreeMap::new() }
     }
@@ -101,6 +122,12 @@ impl Bridge {
         self.peers.insert(peer, Peer { name, credit, ..Peer::default() });
     }
 
+    /// A peer that takes nothing.
+    pub(crate) fn giver_up(&mut self, peer: PeerId, name: String) {
+        self.counters.peers_seen += 1;
+        self.peers.insert(peer, Peer { name, gives_alone: true, ..Peer::default() });
+    }
+
     pub(crate) fn peer_down(&mut self, peer: PeerId) -> Option<String> {
         let gone = self.peers.remove(&peer)?;
         self.counters.shed_stalled += gone.queue.len() as u64;
@@ -111,8 +138,20 @@ impl Bridge {
         self.peers.get(&peer).map_or("a former peer", |peer| &peer.name)
     }
 
-    pub(crate) fn peers(&self) -> Vec<PeerId> {
-        self.peers.keys().copied().collect()
+    /// Those that take messages.
+    pub(crate) fn takers(&self) -> Vec<PeerId> {
+        self.peers.iter().filter(|(_, peer)| !peer.gives_alone).map(|(&id, _)| id).collect()
+    }
+
+    /// Whether both lead to one peer.
+    pub(crate) fn leads_where(&self, other: &Self) -> bool {
+        self.spec.peer.is_some() && self.spec.peer == other.spec.peer
+    }
+
+    /// So many messages counted as exported were not wanted by their peer.
+    pub(crate) fn unwanted(&mut self, count: u64) {
+        self.counters.exported = self.counters.exported.saturating_sub(count);
+        self.counters.not_subscribed += count;
     }
 
     pub(crate) fn status(&self) -> String {
@@ -124,14 +163,18 @@ impl Bridge {
     }
 
     /// Reads a message of a peer and counts what becomes of it.
-    pub(crate) fn import(&mut self, message: Bytes) -> Result<Imported, Refused> {
-        let read = self.importer.read(message);
+    pub(crate) fn import(&mut self, message: Incoming) -> Result<Imported, Refused> {
+        let read = match message {
+            Incoming::Delimited(message) => self.importer.read(message),
+            Incoming::Parts(frames) => self.importer.read_parts(&frames),
+        };
         match &read {
             Ok(imported) => {
                 self.counters.imported += 1;
                 self.counters.sources_assigned += u64::from(imported.assigned);
+                self.counters.sources_rewritten += u64::from(imported.rewritten);
             }
-            Err(Refused::Malformed(_)) => self.counters.refused_malformed += 1,
+            Err(Refused::Malformed(_) | Refused::Parts(_)) => self.counters.refused_malformed += 1,
             Err(Refused::ForeignEntity(_)) => self.counters.refused_foreign_entity += 1,
             Err(Refused::Filtered) => self.counters.filtered += 1,
         }

@@ -5,6 +5,7 @@ use crate::link::{CarrierId, Record};
 use crate::service::{ComponentHealth, Job, JobOutput, Note};
 use aldis_envelope::codec::native::HeaderError;
 use aldis_envelope::codec::stream::StreamError;
+use aldis_envelope::codec::zmtp::ZmtpError;
 use aldis_envelope::{Envelope, Label, Monotonic, Priority, Source};
 use bytes::Bytes;
 use std::sync::Arc;
@@ -85,14 +86,45 @@ pub enum BridgeEvent {
 pub enum PeerEvent {
     /// The peer is there under this name, and so many bytes may be sent to it.
     Up(String, usize),
+    /// A peer is there under this name that takes nothing.
+    Gives(String),
     /// The peer is gone, and why.
     Down(String),
     /// A message in delimited form.
     Message(Bytes),
+    /// A message in several frames.
+    Parts(Vec<Bytes>),
+    /// So many messages that were sent to the peer it had not subscribed to, so that they were left out.
+    Unwanted(u64),
     /// So many bytes more may be sent.
     Ready(usize),
     /// Something that is no message.
-    Bad(StreamError),
+    Bad(BadInput),
+}
+
+/// Something that a peer sent and that is no message.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum BadInput {
+    /// A stretch of a stream.
+    #[error(transparent)]
+    Stream(#[from] StreamError),
+    /// What ends a ZeroMQ connection.
+    #[error(transparent)]
+    Zmtp(#[from] ZmtpError),
+    /// One frame where several are spoken.
+    #[error("a message of one frame; this bridge speaks seven (`framing = \"multipart\"`)")]
+    OneFrame,
+    /// Several frames where one is spoken.
+    #[error("a message of {0} frames; this bridge speaks one (`framing = \"single\"`)")]
+    SeveralFrames(usize),
+    /// A message over the limit.
+    #[error("a message of {declared} bytes or more, at most {limit} are allowed")]
+    TooLarge {
+        /// What was declared.
+        declared: u64,
+        /// The limit.
+        limit: usize,
+    },
 }
 
 /// Something at a link.

@@ -36,6 +36,12 @@ impl Health {
     }
 
     fn component(&mut self, now: Now, health: &ComponentHealth, out: &mut Outbox) {
+        if health.condition == Condition::Gone {
+            if let (Some(last), Some(label)) = (self.own.remove(&health.component), &self.label) {
+                out.send(umaa::dispose(label.clone(), &last));
+            }
+            return;
+        }
         let (resource_id, code) = match &health.component {
             Component::Service(source) => (self.guids.of_service(*source), ErrorCode::Software),
             Component::Resource("disk") => {
@@ -48,7 +54,7 @@ impl Health {
         let (severity, code) = match health.condition {
             Condition::Well => (ErrorCondition::None, ErrorCode::None),
             Condition::Degraded => (ErrorCondition::Warn, code),
-            Condition::Failed => (ErrorCondition::Fail, code),
+            Condition::Failed | Condition::Gone => (ErrorCondition::Fail, code),
         };
         let what = match &health.component {
             Component::Service(source) => source.to_string(),

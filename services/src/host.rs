@@ -33,6 +33,8 @@ pub(crate) struct Hosted {
     restart_at: Option<Monotonic>,
     restart_delay: Duration,
     retired: bool,
+    /// Taken away: its place is free for another.
+    removed: bool,
 }
 
 impl Hosted {
@@ -48,6 +50,7 @@ impl Hosted {
             restart_at: None,
             restart_delay: RESTART_DELAY_MIN,
             retired: false,
+            removed: false,
         }
     }
 
@@ -100,6 +103,19 @@ impl Hosted {
         self.retired = true;
     }
 
+    /// Takes the service away; its place may be given to another.
+    pub(crate) fn remove(&mut self) {
+        self.retire();
+        self.outbox.forget();
+        self.prefixes = Vec::new();
+        self.removed = true;
+    }
+
+    /// Whether its place is free for another.
+    pub(crate) fn is_removed(&self) -> bool {
+        self.removed
+    }
+
     pub(crate) fn is_running(&self) -> bool {
         self.service.is_some()
     }
@@ -120,7 +136,7 @@ impl Hosted {
     pub(crate) fn prefixes(&self) -> impl Iterator<Item = Prefix> + '_ {
         let source = self.spec.source;
         let own = [Prefix::Id(Address::Service(source)), Prefix::Id(Address::EntityServices(source.entity))];
-        own.into_iter().chain(self.prefixes.iter().cloned())
+        own.into_iter().filter(|_| !self.removed).chain(self.prefixes.iter().cloned())
     }
 
     /// What it subscribed to.
@@ -132,6 +148,9 @@ impl Hosted {
     /// Whether a message to this address is for it.
     pub(crate) fn receives(&self, address: &Address) -> bool {
         let source = self.spec.source;
+        if self.removed {
+            return false;
+        }
         match address {
             Address::Service(to) if *to == source => true,
             Address::EntityServices(entity) | Address::Entity(entity) if *entity == source.entity => true,

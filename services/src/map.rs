@@ -1,3 +1,5 @@
-//! Pure translation between envelopes and what bridges speak.
+//! Translations: what bridges carry in and out, and what one world says in words of the other.
 
+pub mod health;
+pub mod surface;
 pub mod uxas;

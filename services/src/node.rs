@@ -5,6 +5,7 @@ mod bridges;
 mod deliver;
 mod journaling;
 mod keeping;
+mod life;
 mod links;
 mod running;
 mod sharing;

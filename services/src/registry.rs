@@ -2,6 +2,8 @@
 
 use crate::health::Health;
 use crate::log::Log;
+use crate::manager::{Maker, Manager};
+use crate::player::{Player, Scheduled};
 use crate::service::{Input, Outbox, Service, ServiceSpec};
 use crate::track::{Track, TrackConfig};
 use crate::umaa::allocation::{Arbiter, Arbitration};
@@ -28,6 +30,10 @@ pub enum Kind {
     Track(TrackConfig),
     /// A core service of UxAS.
     Core(Core),
+    /// Starts and ends services when it is asked to.
+    Manager(Maker),
+    /// Sends prepared messages.
+    Player(Vec<Scheduled>),
 }
 
 /// Stands where the host answers for itself: for the node at service 1, and for each bridge.
@@ -75,6 +81,8 @@ pub fn service(source: Source, name: &str, kind: Kind, guids: &Guids) -> Service
             Kind::Health { period } => Box::new(Health::new(source.entity, guids.clone(), *period)),
             Kind::Log => Box::new(Log::new(source.entity, &guids)),
             Kind::Arbiter(arbitration) => Box::new(Arbiter::new(source, &guids, arbitration.clone())),
+            Kind::Manager(maker) => Box::new(Manager::new(source, maker.clone())),
+            Kind::Player(messages) => Box::new(Player::new(source, messages.clone())),
             Kind::Track(track) => Box::new(Track::new(source, track.clone())),
             Kind::Core(core) => core.service(),
         }

@@ -111,6 +111,8 @@ pub enum Condition {
     Degraded,
     /// It does not work.
     Failed,
+    /// It has been taken away: there is nothing more to report.
+    Gone,
 }
 
 /// The health of a part of the node: a service, a bridge, the bus, the disk.

@@ -28,6 +28,20 @@ pub fn checksum(bytes: &[u8]) -> u32 {
     bytes.iter().fold(0, |sum, &byte| sum.wrapping_add(u32::from(byte)))
 }
 
+/// How damage of a frame is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Check {
+    /// The sum of the bytes alone. Damage of two bytes can cancel out in it.
+    #[default]
+    Sum,
+    /// In addition the CRC-32 of the delimited form in eight hexadecimal digits after the frame. Both ends must have it: for
+    /// OpenUxAS it is junk between frames.
+    Crc,
+}
+
+/// How many digits a CRC has.
+const CRC_DIGITS: usize = 8;
+
 /// Writes frames. It keeps the head of the label that it wrote last, since streams come in runs.
 #[derive(Debug)]
 pub struct Writer {
@@ -35,12 +49,19 @@ pub struct Writer {
     last: Option<Arc<Label>>,
     head: Vec<u8>,
     head_sum: u32,
+    check: Check,
 }
 
 impl Writer {
     /// A writer that spells ids in a dialect.
     pub fn new(dialect: Dialect) -> Self {
-        Self { dialect, last: None, head: Vec::new(), head_sum: 0 }
+        Self { dialect, last: None, head: Vec::new(), head_sum: 0, check: Check::Sum }
+    }
+
+    /// The same writer with a check of its frames.
+    #[must_use]
+    pub fn with_check(self, check: Check) -> Self {
+        Self { check, ..self }
     }
 
     /// Appends one frame.
@@ -62,6 +83,12 @@ impl Writer {
         out.extend_from_slice(BODY_END);
         let _ = write!(out, "{sum}");
         out.extend_from_slice(TAIL);
+        if self.check == Check::Crc {
+            let mut crc = crc32fast::Hasher::new();
+            crc.update(&self.head);
+            crc.update(payload);
+            let _ = write!(out, "{:08x}", crc.finalize());
+        }
     }
 }
 

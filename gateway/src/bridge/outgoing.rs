@@ -6,10 +6,13 @@ use std::io::{ErrorKind, Write};
 /// Whole frames are written together up to this size: an OpenUxAS peer reads 8 KiB at once and dies of a frame split
 /// over two reads.
 const WRITE_BYTES_MAX: usize = 8_192;
+/// A reader of ZeroMQ takes pieces of any size: few system calls count.
+const WRITE_BYTES_MAX_ZEROMQ: usize = 256 * 1024;
 
 /// Frames that wait to be written. What may be in it is bounded by the credit that the node was given.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Outgoing {
+    write_bytes_max: usize,
     bytes: Vec<u8>,
     written: usize,
     /// Where each frame ends, and how many bytes of content it carries.
@@ -25,7 +28,18 @@ pub(crate) enum Written {
     Blocked,
 }
 
+impl Default for Outgoing {
+    fn default() -> Self {
+        Self { write_bytes_max: WRITE_BYTES_MAX, bytes: Vec::new(), written: 0, frames: VecDeque::new() }
+    }
+}
+
 impl Outgoing {
+    /// For a peer that speaks ZeroMQ.
+    pub(crate) fn zeromq() -> Self {
+        Self { write_bytes_max: WRITE_BYTES_MAX_ZEROMQ, ..Self::default() }
+    }
+
     /// Where a frame is appended; [`Self::end_frame`] must follow.
     pub(crate) fn buffer(&mut self) -> &mut Vec<u8> {
         &mut self.bytes
@@ -60,7 +74,7 @@ impl Outgoing {
 
     /// The end of the last whole frame that fits one write, or of the first frame where none fits.
     fn end_of_write(&self) -> usize {
-        let limit = self.written + WRITE_BYTES_MAX;
+        let limit = self.written + self.write_bytes_max;
         let fitting = self.frames.partition_point(|&(end, _)| end <= limit).max(1);
         self.frames.get(fitting - 1).map_or(self.bytes.len(), |&(end, _)| end)
     }

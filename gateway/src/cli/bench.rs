@@ -2,15 +2,19 @@
 
 mod bus;
 mod child;
+mod configured;
 mod join;
 mod journal;
 mod link;
 mod lmcp;
+mod load;
 mod plan;
+mod rounds;
 mod service_node;
 mod statistics;
 mod umaa;
 mod uxas;
+mod zmq;
 
 use super::exit::Failure;
 use clap::Subcommand;
@@ -18,7 +22,7 @@ use clap::Subcommand;
 /// Measure this machine: each figure beside a peer's or the limit's, turn about in the same run.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json\n  aldis bench lmcp --json\n  aldis bench join --instances 10000 --rate 1000 --json\n  aldis bench umaa --json\n  aldis bench journal --json\n  aldis bench plan --json\n  aldis bench link --profile L1 --json"
+    after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json\n  aldis bench zmq --json\n  aldis bench lmcp --json\n  aldis bench join --instances 10000 --rate 1000 --json\n  aldis bench umaa --json\n  aldis bench journal --json\n  aldis bench plan --json\n  aldis bench link --profile L1 --json"
 )]
 pub(crate) struct Bench {
     #[command(subcommand)]
@@ -31,6 +35,8 @@ enum What {
     Bus(bus::BusBench),
     /// From a UxAS stream through a node to a UxAS stream, against a plain TCP copy.
     Uxas(uxas::UxasBench),
+    /// From a ZeroMQ socket through a node to a ZeroMQ socket, against a bare forwarder.
+    Zmq(zmq::ZmqBench),
     /// A late joiner of many retained instances, while their writer keeps writing.
     Join(join::JoinBench),
     /// LMCP messages read and written on one core.
@@ -55,6 +61,9 @@ enum What {
     /// The plain TCP copy of `bench uxas`.
     #[command(hide = true)]
     TcpCopy(uxas::TcpCopy),
+    /// The bare forwarder of `bench zmq`.
+    #[command(hide = true)]
+    ZmqCopy(zmq::ZmqCopy),
     /// The other process of `bench journal`.
     #[command(hide = true)]
     JournalPeer(journal::JournalPeer),
@@ -65,6 +74,8 @@ impl Bench {
         match self.what {
             What::Bus(bench) => bench.run(),
             What::Uxas(bench) => bench.run(),
+            What::Zmq(bench) => bench.run(),
+            What::ZmqCopy(copy) => copy.run(),
             What::Join(bench) => bench.run(),
             What::Joiner(joiner) => joiner.run(),
             What::Lmcp(bench) => bench.run(),

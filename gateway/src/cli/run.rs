@@ -3,6 +3,7 @@
 use super::exit::Failure;
 use super::telemetry;
 use crate::config::Config;
+use crate::config::uxas_file::{self, Remark};
 use crate::runtime::{self, Control};
 use std::path::PathBuf;
 use tokio::signal::unix::{SignalKind, signal};
@@ -12,17 +13,20 @@ use tokio::sync::mpsc;
 ///
 /// The node ends in order: it disposes its health reports and withdraws its tokens, within a bound of five seconds.
 #[derive(clap::Args)]
-#[command(after_help = "Example:\n  aldis run configs/shore.toml")]
+#[command(after_help = "Examples:\n  aldis run configs/shore.toml\n  aldis run cfg_WaterwaySearch.xml")]
 pub(crate) struct Run {
-    /// The node's configuration.
+    /// The node's configuration; one of OpenUxAS where the name ends in `.xml`.
     config: PathBuf,
 }
 
 impl Run {
     pub(crate) fn run(self) -> Result<(), Failure> {
-        let config = Config::load(&self.config)?;
+        let (config, remarks) = self.load()?;
         let outside = runtime::outside(&config).map_err(|why| Failure::Usage(why.to_string()))?;
         telemetry::start(&config.log);
+        for remark in remarks {
+            tracing::warn!("{}:{}: {}", self.config.display(), remark.line, remark.text);
+        }
         tracing::info!(
             "{}: entity {} of fleet {}",
             config.name.as_str(),
@@ -35,6 +39,17 @@ impl Run {
         })?;
         runtime::run(runtime::node_config(&config), outside, controlled)
             .map_err(|why| Failure::Failed(why.to_string()))
+    }
+}
+
+impl Run {
+    /// The configuration, and what is to be said of one of OpenUxAS.
+    fn load(&self) -> Result<(Config, Vec<Remark>), Failure> {
+        if self.config.extension().is_none_or(|extension| extension != "xml") {
+            return Ok((Config::load(&self.config)?, Vec::new()));
+        }
+        let imported = uxas_file::import(&self.config).map_err(|why| Failure::Usage(why.to_string()))?;
+        Ok((Config::of_uxas(&self.config, &imported)?, imported.remarks))
     }
 }
 

@@ -1,14 +1,24 @@
 //! Bridges: where another world is joined to the fleet.
 
+mod common;
+mod uxas_serial;
+mod uxas_tcp;
+mod uxas_zmq;
+
+pub(crate) use common::Common;
+pub(super) use uxas_serial::UxasSerialTable;
+pub(crate) use uxas_serial::{Check, UxasSerial};
+pub(super) use uxas_tcp::UxasTcpTable;
+pub(crate) use uxas_tcp::{Endpoint, UxasTcp};
+pub(super) use uxas_zmq::UxasZmqTable;
+pub(crate) use uxas_zmq::{Framing, Sockets, UxasZmq};
+
 use super::error::Fault;
-use super::schema;
-use super::text::PlainName;
-use aldis_envelope::{Dialect, Prefix, ServiceId};
+use aldis_envelope::{Prefix, ServiceId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::net::SocketAddr;
 use std::ops::RangeInclusive;
-use std::time::Duration;
 
 /// The service ids of bridges.
 pub(crate) const BRIDGE_SERVICES: RangeInclusive<u32> = 20..=99;
@@ -16,204 +26,55 @@ pub(crate) const BRIDGE_SERVICES: RangeInclusive<u32> = 20..=99;
 /// One `[[bridge]]`, by its `kind`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
+#[allow(clippy::enum_variant_names, reason = "other worlds than UxAS will come")]
 pub(crate) enum Bridge {
     /// The UxAS stream form over TCP.
     UxasTcp(UxasTcp),
+    /// The UxAS stream form on a serial device.
+    UxasSerial(UxasSerial),
+    /// UxAS over ZeroMQ.
+    UxasZmq(UxasZmq),
 }
 
 impl Bridge {
     /// What may stand as `kind`.
-    pub(crate) const KINDS: &[&str] = &["uxas-tcp"];
+    pub(crate) const KINDS: &[&str] = &["uxas-tcp", "uxas-serial", "uxas-zmq"];
 
-    /// The name, unique on the node.
-    pub(crate) fn name(&self) -> &PlainName {
+    /// What every kind has.
+    pub(crate) fn common(&self) -> &Common {
         match self {
-            Self::UxasTcp(bridge) => &bridge.name,
+            Self::UxasTcp(bridge) => &bridge.common,
+            Self::UxasSerial(bridge) => &bridge.common,
+            Self::UxasZmq(bridge) => &bridge.common,
         }
     }
 
-    /// The service id, unique on the node.
-    pub(crate) fn service(&self) -> ServiceId {
+    /// The addresses that the bridge listens on, each with its key.
+    pub(crate) fn listens(&self) -> Vec<(&'static str, SocketAddr)> {
         match self {
-            Self::UxasTcp(bridge) => bridge.service,
+            Self::UxasTcp(UxasTcp { endpoint: Endpoint::Listen(address), .. }) => vec![("listen", *address)],
+            Self::UxasZmq(UxasZmq { sockets: Sockets::PublishPull { publish, pull }, .. }) => {
+                vec![("publish", *publish), ("pull", *pull)]
+            }
+            Self::UxasTcp(_) | Self::UxasSerial(_) | Self::UxasZmq(_) => Vec::new(),
         }
     }
-
-    /// The address that the bridge listens on, if it does.
-    pub(crate) fn listen(&self) -> Option<SocketAddr> {
-        match self {
-            Self::UxasTcp(UxasTcp { endpoint: Endpoint::Listen(address), .. }) => Some(*address),
-            Self::UxasTcp(_) => None,
-        }
-    }
-}
-
-/// Which side of a connection a bridge takes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Endpoint {
-    /// It waits for peers; several may come.
-    Listen(SocketAddr),
-    /// It connects to one peer, again and again.
-    Connect(SocketAddr),
-}
-
-/// A bridge that speaks the UxAS stream form over TCP, as server or as client.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(try_from = "UxasTcpTable", into = "UxasTcpTable")]
-pub(crate) struct UxasTcp {
-    /// The name in logs and counters.
-    pub(crate) name: PlainName,
-    /// The service id of the bridge on the node's own entity.
-    pub(crate) service: ServiceId,
-    /// Whether it waits for peers or connects to one.
-    pub(crate) endpoint: Endpoint,
-    /// How ids are written towards the peer; both spellings are read.
-    pub(crate) dialect: Dialect,
-    /// Addresses taken from the peer into the fleet.
-    pub(crate) import: Vec<Prefix>,
-    /// Addresses given from the fleet to the peer.
-    pub(crate) export: Vec<Prefix>,
-    /// The largest message, in bytes, in either direction.
-    pub(crate) message_bytes_max: u32,
-    /// How many messages wait for a peer that does not take them.
-    pub(crate) queue_messages_max: u32,
-    /// How long a peer may take nothing before it is disconnected, in milliseconds.
-    pub(crate) stall_timeout_ms: u32,
-}
-
-impl UxasTcp {
-    /// How long a peer may take nothing before it is disconnected.
-    pub(crate) fn stall_timeout(&self) -> Duration {
-        Duration::from_millis(u64::from(self.stall_timeout_ms))
-    }
-}
-
-/// The table as it is written.
-#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct UxasTcpTable {
-    /// The name in logs and counters, unique on the node.
-    name: PlainName,
-    /// The service id of the bridge on the node's own entity: 20 to 99, unique on the node.
-    #[schemars(with = "schema::BridgeServiceId")]
-    service: ServiceId,
-    /// Wait for peers on this address. Exactly one of `listen` and `connect` is given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<String>")]
-    listen: Option<SocketAddr>,
-    /// Connect to the peer at this address, again with back-off when it is absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(with = "Option<String>")]
-    connect: Option<SocketAddr>,
-    /// How ids are written towards the peer; both spellings are always read.
-    #[serde(default)]
-    #[schemars(with = "schema::Dialect")]
-    dialect: Dialect,
-    /// Addresses taken from the peer into the fleet. Default: all.
-    #[serde(default = "all")]
-    #[schemars(with = "Vec<schema::Prefix>")]
-    import: Vec<Prefix>,
-    /// Addresses given from the fleet to the peer. Default: all.
-    #[serde(default = "all")]
-    #[schemars(with = "Vec<schema::Prefix>")]
-    export: Vec<Prefix>,
-    /// The largest message in bytes; what declares more is skipped and counted. Default: 16 MiB, above the largest
-    /// plan seen from OpenUxAS and small enough that a hostile length costs little.
-    #[serde(default = "message_bytes_max")]
-    #[schemars(range(min = 1024, max = 1_073_741_824))]
-    message_bytes_max: u32,
-    /// How many messages wait for a peer that does not take them; at the limit the input is held back. Default:
-    /// 8192, about 10 ms of the fastest stream; less makes bursts wait, more makes old telemetry.
-    #[serde(default = "queue_messages_max")]
-    #[schemars(range(min = 1, max = 1_000_000))]
-    queue_messages_max: u32,
-    /// How long a peer may take nothing before it is disconnected, in milliseconds. Default: 5000; less cuts off
-    /// peers that stop to think, more holds the others back.
-    #[serde(default = "stall_timeout_ms")]
-    #[schemars(range(min = 10, max = 600_000))]
-    stall_timeout_ms: u32,
 }
 
 pub(super) fn all() -> Vec<Prefix> {
     vec![Prefix::all()]
 }
 
-fn message_bytes_max() -> u32 {
-    16 << 20
-}
-
-fn queue_messages_max() -> u32 {
-    8192
-}
-
-fn stall_timeout_ms() -> u32 {
-    5000
-}
-
-impl TryFrom<UxasTcpTable> for UxasTcp {
-    type Error = Fault;
-
-    fn try_from(table: UxasTcpTable) -> Result<Self, Fault> {
-        let endpoint = endpoint(table.listen, table.connect)?;
-        bridge_service(table.service)?;
-        in_range("message_bytes_max", table.message_bytes_max, 1024..=1 << 30, "bytes")?;
-        in_range("queue_messages_max", table.queue_messages_max, 1..=1_000_000, "messages")?;
-        in_range("stall_timeout_ms", table.stall_timeout_ms, 10..=600_000, "milliseconds")?;
-        Ok(Self {
-            name: table.name,
-            service: table.service,
-            endpoint,
-            dialect: table.dialect,
-            import: table.import,
-            export: table.export,
-            message_bytes_max: table.message_bytes_max,
-            queue_messages_max: table.queue_messages_max,
-            stall_timeout_ms: table.stall_timeout_ms,
-        })
+/// Nobody can be reached at port 0.
+fn reachable(key: &str, address: SocketAddr) -> Result<SocketAddr, Fault> {
+    if address.port() != 0 {
+        return Ok(address);
     }
-}
-
-impl From<UxasTcp> for UxasTcpTable {
-    fn from(bridge: UxasTcp) -> Self {
-        let (listen, connect) = match bridge.endpoint {
-            Endpoint::Listen(address) => (Some(address), None),
-            Endpoint::Connect(address) => (None, Some(address)),
-        };
-        Self {
-            name: bridge.name,
-            service: bridge.service,
-            listen,
-            connect,
-            dialect: bridge.dialect,
-            import: bridge.import,
-            export: bridge.export,
-            message_bytes_max: bridge.message_bytes_max,
-            queue_messages_max: bridge.queue_messages_max,
-            stall_timeout_ms: bridge.stall_timeout_ms,
-        }
-    }
-}
-
-fn endpoint(listen: Option<SocketAddr>, connect: Option<SocketAddr>) -> Result<Endpoint, Fault> {
-    match (listen, connect) {
-        (Some(_), Some(_)) => Err(Fault::new(
-            "connect",
-            "the bridge has both `listen` and `connect`",
-            "keep one: `listen` waits for peers, `connect` goes to one; for both, write two bridges",
-        )),
-        (None, None) => Err(Fault::new(
-            "",
-            "the bridge has neither `listen` nor `connect`",
-            "add `listen = \"127.0.0.1:5556\"` to wait for peers, or `connect = …` to go to one",
-        )),
-        (Some(address), None) => Ok(Endpoint::Listen(address)),
-        (None, Some(address)) if address.port() == 0 => Err(Fault::new(
-            "connect",
-            "nobody can be reached at port 0",
-            "give the port on which the peer listens, such as \"127.0.0.1:5555\"",
-        )),
-        (None, Some(address)) => Ok(Endpoint::Connect(address)),
-    }
+    Err(Fault::new(
+        key,
+        "nobody can be reached at port 0",
+        "give the port on which the peer listens, such as \"127.0.0.1:5555\"",
+    ))
 }
 
 fn bridge_service(service: ServiceId) -> Result<(), Fault> {
@@ -240,3 +101,6 @@ pub(super) fn in_range<T: PartialOrd + std::fmt::Display>(
     let (min, max) = range.into_inner();
     Err(Fault::new(key, format!("`{key}` = {value} is out of range"), format!("give {min} to {max} {unit}")))
 }
+
+#[cfg(test)]
+mod tests;

@@ -92,26 +92,26 @@ fn bridges(config: &Config, faults: &mut Vec<Fault>) {
     let mut listeners = BTreeMap::new();
     for (index, bridge) in config.bridges.iter().enumerate() {
         let path = |key: &str| format!("bridge.{index}.{key}");
-        if let Some(first) = names.insert(bridge.name(), index) {
-            let message = format!("two bridges have the name `{}`", bridge.name());
+        let common = bridge.common();
+        if let Some(first) = names.insert(&common.name, index) {
+            let message = format!("two bridges have the name `{}`", common.name);
             faults.push(Fault::new(
                 path("name"),
                 message,
                 format!("rename one; bridge {} has it too", first + 1),
             ));
         }
-        if let Some(first) = services.insert(bridge.service(), bridge.name()) {
-            let message = format!("two bridges have service {}", bridge.service());
+        if let Some(first) = services.insert(common.service, &common.name) {
+            let message = format!("two bridges have service {}", common.service);
             faults.push(Fault::new(path("service"), message, format!("give another; `{first}` has it too")));
         }
-        let Some(address) = bridge.listen().filter(|address| address.port() != 0) else { continue };
-        if let Some(first) = listeners.insert(address, bridge.name()) {
-            let message = format!("two bridges listen on {address}");
-            faults.push(Fault::new(
-                path("listen"),
-                message,
-                format!("take another port; `{first}` has this one"),
-            ));
+        let listens = bridge.listens().into_iter().filter(|(_, address)| address.port() != 0);
+        for (key, address) in listens {
+            if let Some(first) = listeners.insert(address, &common.name) {
+                let message = format!("two bridges listen on {address}");
+                let help = format!("take another port; `{first}` has this one");
+                faults.push(Fault::new(path(key), message, help));
+            }
         }
     }
 }

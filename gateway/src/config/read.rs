@@ -3,15 +3,17 @@
 //! Tables with a `kind` are taken out and read one by one, because serde loses the place of a mistake inside of them.
 
 use super::Config;
-use super::bridge::{Bridge, UxasTcp, UxasTcpTable};
+use super::bridge::{Bridge, UxasSerial, UxasSerialTable, UxasTcp, UxasTcpTable, UxasZmq, UxasZmqTable};
 use super::check;
 use super::cure::{nearest, split};
 use super::error::{ConfigError, Fault};
-use super::service::{Service, Track};
+use super::send_messages::SendMessages;
+use super::service::{Service, ServiceManager, Track, named_service};
 use miette::NamedSource;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use std::ops::Range;
+use std::path::Path;
 use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
@@ -28,6 +30,26 @@ pub(super) fn read(file: &str, text: &str) -> Result<Config, ConfigError> {
         Some(error) => Err(error),
         None => Ok(config),
     }
+}
+
+/// Reads the files that a configuration names; relative ones are taken from a directory.
+pub(super) fn read_files(
+    config: &mut Config,
+    file: &str,
+    text: &str,
+    base: &Path,
+) -> Result<(), ConfigError> {
+    let source = Arc::new(NamedSource::new(file, text.to_owned()));
+    let mut mistakes = Vec::new();
+    for (index, service) in config.services.iter_mut().enumerate() {
+        if let Service::SendMessages(send) = service
+            && let Err(fault) = send.read(base)
+        {
+            let fault = fault.below(&format!("service.{index}"));
+            mistakes.push(located(&source, text, Mistake::Fault(fault)));
+        }
+    }
+    ConfigError::all(mistakes).map_or(Ok(()), Err)
 }
 
 /// What was found: with its place, or with a path to look the place up.
@@ -74,6 +96,14 @@ fn bridge(element: Element<'_>, index: usize) -> Result<Bridge, Mistake> {
             let bridge = UxasTcp::try_from(typed::<UxasTcpTable>(table)?);
             Ok(Bridge::UxasTcp(bridge.map_err(|f| Mistake::Fault(f.below(&path)))?))
         }
+        "uxas-serial" => {
+            let bridge = UxasSerial::try_from(typed::<UxasSerialTable>(table)?);
+            Ok(Bridge::UxasSerial(bridge.map_err(|f| Mistake::Fault(f.below(&path)))?))
+        }
+        "uxas-zmq" => {
+            let bridge = UxasZmq::try_from(typed::<UxasZmqTable>(table)?);
+            Ok(Bridge::UxasZmq(bridge.map_err(|f| Mistake::Fault(f.below(&path)))?))
+        }
         other => Err(unknown_kind(&path, other, Bridge::KINDS)),
     }
 }
@@ -85,6 +115,15 @@ fn service(element: Element<'_>, index: usize) -> Result<Service, Mistake> {
         "track" => {
             let track = typed::<Track>(table)?.check();
             Ok(Service::Track(track.map_err(|f| Mistake::Fault(f.below(&path)))?))
+        }
+        "service-manager" => {
+            let manager = typed::<ServiceManager>(table)?;
+            named_service(manager.service).map_err(|f| Mistake::Fault(f.below(&path)))?;
+            Ok(Service::ServiceManager(manager))
+        }
+        "send-messages" => {
+            let send = typed::<SendMessages>(table)?.check();
+            Ok(Service::SendMessages(send.map_err(|f| Mistake::Fault(f.below(&path)))?))
         }
         other => core(other, table, &path),
     }

@@ -3,6 +3,7 @@
 use super::bridge::in_range;
 use super::error::Fault;
 use super::schema;
+use super::send_messages::SendMessages;
 use super::uxas::{self, CoreTable};
 use aldis_envelope::{EntityId, ServiceId, Source};
 use aldis_services::track::TrackConfig;
@@ -38,12 +39,18 @@ pub(crate) enum Service {
     WaypointPlanManager(uxas::WaypointPlanManager),
     /// A simulated vehicle that follows its missions.
     SimulatedVehicle(uxas::SimulatedVehicle),
+    /// Sends LMCP messages from files at their times.
+    SendMessages(SendMessages),
+    /// Starts and ends services when UxAS asks for it, and tells who comes and goes.
+    ServiceManager(ServiceManager),
 }
 
 impl Service {
     /// What may stand as `kind`.
     pub(crate) const KINDS: &[&str] = &[
         "track",
+        "send-messages",
+        "service-manager",
         "automation-request-validator",
         "task-manager",
         "sensor-manager",
@@ -59,7 +66,7 @@ impl Service {
     /// The table of a core service; none where it is something else.
     pub(crate) fn core(&self) -> Option<&dyn CoreTable> {
         Some(match self {
-            Self::Track(_) => return None,
+            Self::Track(_) | Self::SendMessages(_) | Self::ServiceManager(_) => return None,
             Self::AutomationRequestValidator(table) => table,
             Self::TaskManager(table) => table,
             Self::SensorManager(table) => table,
@@ -77,6 +84,8 @@ impl Service {
     pub(crate) fn service(&self) -> ServiceId {
         match self {
             Self::Track(track) => track.service,
+            Self::SendMessages(send) => send.service,
+            Self::ServiceManager(manager) => manager.service,
             core => core.core().and_then(CoreTable::service).unwrap_or(ServiceId::NODE),
         }
     }
@@ -85,9 +94,31 @@ impl Service {
     pub(crate) fn entity(&self) -> Option<EntityId> {
         match self {
             Self::Track(track) => track.entity,
+            Self::SendMessages(_) | Self::ServiceManager(_) => None,
             core => core.core().and_then(CoreTable::entity),
         }
     }
+}
+
+/// The service manager of UxAS: `CreateNewService`, `KillService`, `StartupComplete`, `EntityJoin` and `EntityExit`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ServiceManager {
+    /// The service id, 100 or more, unique on the node.
+    #[schemars(with = "schema::NamedServiceId")]
+    pub(crate) service: ServiceId,
+}
+
+/// Whether a configuration may give a service id.
+pub(super) fn named_service(service: ServiceId) -> Result<(), Fault> {
+    if service.get() >= SERVICE_MIN {
+        return Ok(());
+    }
+    Err(Fault::new(
+        "service",
+        format!("service {service} is not for a configuration to give"),
+        "give 100 or more; 1 to 19 are built in, 20 to 99 are bridges",
+    ))
 }
 
 /// A vehicle that moves at constant speed and turn rate and tells where it is: a straight line or a circle.
@@ -150,13 +181,7 @@ impl Track {
 
     /// Checks what the types do not.
     pub(super) fn check(self) -> Result<Self, Fault> {
-        if self.service.get() < SERVICE_MIN {
-            return Err(Fault::new(
-                "service",
-                format!("service {} is not for a configuration to give", self.service),
-                "give 100 or more; 1 to 19 are built in, 20 to 99 are bridges",
-            ));
-        }
+        named_service(self.service)?;
         in_range("latitude_deg", self.latitude_deg, -90.0..=90.0, "degrees")?;
         in_range("longitude_deg", self.longitude_deg, -180.0..=180.0, "degrees")?;
         in_range("heading_deg", self.heading_deg, 0.0..=360.0, "degrees")?;

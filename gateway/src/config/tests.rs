@@ -36,7 +36,7 @@ fn assert_mistake(text: &str, at: (usize, usize), message: &str, cure: &str) {
 fn a_mistake_shows_file_line_column_snippet_and_cure() {
     let error = mistakes(&format!("{TOP}{BRIDGE}{LISTEN}dialekt = \"slides\"\n"));
     let expected = "  × unknown field `dialekt`, expected one of `name`, `service`, `listen`, `connect`, `dialect`, `import`, `export`,
-  │ `message_bytes_max`, `queue_messages_max`, `stall_timeout_ms`
+  │ `message_bytes_max`, `queue_messages_max`, `stall_timeout_ms`, `peer`, `self_generated`
    ╭─[node.toml:8:1]
  7 │ listen = \"127.0.0.1:5556\"
  8 │ dialekt = \"slides\"
@@ -259,8 +259,9 @@ fn defaults() {
     assert_eq!(config.routing.import, [Prefix::all()]);
     assert_eq!(config.health.report_period(), Duration::from_secs(5));
     assert_eq!((config.log.level, config.log.format), (Level::Info, LogFormat::Text));
-    let Bridge::UxasTcp(bridge) = &config.bridges[0];
-    assert_eq!(bridge.endpoint, Endpoint::Listen("127.0.0.1:5556".parse().unwrap()));
+    let Bridge::UxasTcp(tcp) = &config.bridges[0] else { panic!("{:?}", config.bridges) };
+    assert_eq!(tcp.endpoint, Endpoint::Listen("127.0.0.1:5556".parse().unwrap()));
+    let bridge = &tcp.common;
     assert_eq!((bridge.message_bytes_max, bridge.queue_messages_max), (16 << 20, 8192));
     assert_eq!(bridge.stall_timeout(), Duration::from_secs(5));
     assert_eq!((&bridge.import, &bridge.export), (&vec![Prefix::all()], &vec![Prefix::all()]));

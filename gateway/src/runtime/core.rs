@@ -2,12 +2,12 @@
 //! are carried out on the spot, so that a message passes without a change of thread or task.
 
 use super::Ends;
-use crate::bridge::uxas_tcp::Peers;
+use crate::bridge::Peers;
 use crate::bus::{Bus, BusError};
 use crate::carrier::Carriers;
 use crate::clock::Clock;
 use crate::journal::JournalThread;
-use aldis_envelope::{Dialect, Monotonic};
+use aldis_envelope::Monotonic;
 use aldis_services::service::{Job, Level, Note};
 use aldis_services::{Effect, Event, Node};
 use std::collections::VecDeque;
@@ -93,14 +93,13 @@ impl Core {
     pub(super) fn build(
         node: Node,
         journal: Option<JournalThread>,
-        dialects: Vec<Dialect>,
         runtime: tokio::runtime::Handle,
     ) -> (Shared, Ends) {
         let (timer, timer_end) = watch::channel(None);
         let (paused, paused_end) = watch::channel(false);
         let (exited, exited_end) = watch::channel(false);
         let (jobs, jobs_end) = mpsc::unbounded_channel();
-        let peers = Peers::new(dialects);
+        let peers = Peers::default();
         let (clock, effects) = (Clock::start(), Vec::new());
         let wake = Arc::new(Notify::new());
         let core = Self {

@@ -1,6 +1,7 @@
 //! What a UxAS peer sends, as messages of this node (uxas-wire, Envelope).
 
-use aldis_envelope::codec::delimited::{DelimitedError, payload_offset, read_head};
+use aldis_envelope::codec::delimited::{DelimitedError, UxasLabel, payload_offset, read_head};
+use aldis_envelope::codec::multipart::{self, MultipartError};
 use aldis_envelope::{ContentType, EntityId, Instance, Label, Message, Prefix, Source, lmcp};
 use bytes::Bytes;
 use std::collections::BTreeMap;
@@ -18,6 +19,9 @@ pub enum Refused {
     /// It is no message.
     #[error(transparent)]
     Malformed(#[from] DelimitedError),
+    /// It is no message in seven parts.
+    #[error(transparent)]
+    Parts(MultipartError),
     /// Its source is an entity that this node does not speak for.
     #[error("source {0}: this node does not speak for entity {entity}; name it in `entities`", entity = .0.entity)]
     ForeignEntity(Source),
@@ -30,6 +34,7 @@ pub enum Refused {
 struct Head {
     verdict: Result<Accepted, Refused>,
     assigned: bool,
+    rewritten: bool,
 }
 
 /// A head that enters.
@@ -49,6 +54,9 @@ pub struct Importer {
     heads: BTreeMap<Bytes, Head>,
     instances: BTreeMap<i64, Arc<Instance>>,
     last: Option<(Bytes, Accepted)>,
+    self_generated: bool,
+    /// Kept for its memory.
+    scratch: Vec<u8>,
 }
 
 /// A message read, and whether its source had to be assigned.
@@ -58,12 +66,28 @@ pub struct Imported {
     pub message: Message,
     /// Whether the peer left the source `0|0`.
     pub assigned: bool,
+    /// Whether its source was replaced by the bridge's own.
+    pub rewritten: bool,
 }
 
 impl Importer {
     /// An importer of the bridge `own` on a node that speaks for `entities`.
     pub fn new(own: Source, entities: Vec<EntityId>, import: Vec<Prefix>) -> Self {
-        Self { own, entities, import, heads: BTreeMap::new(), instances: BTreeMap::new(), last: None }
+        Self {
+            own,
+            entities,
+            import,
+            heads: BTreeMap::new(),
+            instances: BTreeMap::new(),
+            last: None,
+            self_generated: false,
+            scratch: Vec::new(),
+        }
+    }
+
+    /// The same importer, which makes everything its own: what `ConsiderSelfGenerated` does in OpenUxAS.
+    pub fn self_generated(self) -> Self {
+        Self { self_generated: true, ..self }
     }
 
     /// Reads a message in delimited form.
@@ -76,15 +100,60 @@ impl Importer {
             && message.len() > head.len()
         {
             let (content, accepted) = (message.slice(head.len()..), accepted.clone());
-            return Ok(Imported { message: self.message(&accepted, content), assigned: false });
+            return Ok(self.imported(&accepted, content));
         }
         let offset = payload_offset(&message)?;
         let head = self.head(&message[..offset]);
         let accepted = head.verdict?;
-        if !head.assigned {
+        if !head.assigned && !head.rewritten {
             self.last = Some((Bytes::copy_from_slice(&message[..offset]), accepted.clone()));
         }
-        Ok(Imported { message: self.message(&accepted, message.slice(offset..)), assigned: head.assigned })
+        let (assigned, rewritten) = (head.assigned, head.rewritten);
+        Ok(Imported { assigned, rewritten, ..self.imported(&accepted, message.slice(offset..)) })
+    }
+
+    /// Reads a message in seven parts.
+    ///
+    /// # Errors
+    /// [`Refused`]: why the message does not enter.
+    pub fn read_parts(&mut self, frames: &[Bytes]) -> Result<Imported, Refused> {
+        let [address, attributes @ .., payload] = frames else {
+            return Err(Refused::Parts(MultipartError::Frames(frames.len())));
+        };
+        if frames.len() != 7 {
+            return Err(Refused::Parts(MultipartError::Frames(frames.len())));
+        }
+        if payload.is_empty() {
+            return Err(Refused::Parts(DelimitedError::NoPayload.into()));
+        }
+        // The head as the delimited form has it finds what is remembered of it. A part that holds a delimiter makes a head
+        // with more of them than any good one, so that the two are never taken for each other.
+        let mut head = std::mem::take(&mut self.scratch);
+        head.clear();
+        head.extend_from_slice(address);
+        head.push(b'$');
+        for (place, part) in attributes.iter().enumerate() {
+            if place > 0 {
+                head.push(b'|');
+            }
+            head.extend_from_slice(part);
+        }
+        head.push(b'$');
+        let judged = match self.heads.get(head.as_slice()) {
+            Some(known) => known.clone(),
+            None => {
+                let label = multipart::read(frames).map(|(label, _)| label).map_err(Refused::Parts);
+                self.remember(&head, label)
+            }
+        };
+        self.scratch = head;
+        let accepted = judged.verdict?;
+        let (assigned, rewritten) = (judged.assigned, judged.rewritten);
+        Ok(Imported { assigned, rewritten, ..self.imported(&accepted, payload.clone()) })
+    }
+
+    fn imported(&mut self, accepted: &Accepted, content: Bytes) -> Imported {
+        Imported { message: self.message(accepted, content), assigned: false, rewritten: false }
     }
 
     fn message(&mut self, accepted: &Accepted, content: Bytes) -> Message {
@@ -104,7 +173,12 @@ impl Importer {
         if let Some(head) = self.heads.get(bytes) {
             return head.clone();
         }
-        let head = self.judge(bytes);
+        let label = read_head(bytes).map_err(Refused::Malformed);
+        self.remember(bytes, label)
+    }
+
+    fn remember(&mut self, bytes: &[u8], label: Result<UxasLabel, Refused>) -> Head {
+        let head = self.judge(label);
         if self.heads.len() >= HEADS_MAX {
             self.heads.clear();
         }
@@ -112,12 +186,16 @@ impl Importer {
         head
     }
 
-    fn judge(&self, bytes: &[u8]) -> Head {
-        let label = match read_head(bytes) {
+    fn judge(&self, label: Result<UxasLabel, Refused>) -> Head {
+        let mut label = match label {
             Ok(label) => label,
-            Err(why) => return Head { verdict: Err(why.into()), assigned: false },
+            Err(why) => return Head { verdict: Err(why), assigned: false, rewritten: false },
         };
         let assigned = label.source.is_none();
+        let rewritten = self.self_generated && !assigned;
+        if rewritten {
+            label.source = None;
+        }
         let label = label.or_source(self.own);
         let source = label.source();
         let verdict = if !self.entities.contains(&source.entity) {
@@ -129,7 +207,7 @@ impl Importer {
                 && lmcp::type_of(label.descriptor()).is_some_and(|info| lmcp::key_of(info).is_some());
             Ok(Accepted { label: Arc::new(label), keyed })
         };
-        Head { verdict, assigned }
+        Head { verdict, assigned, rewritten }
     }
 }
 
@@ -176,6 +254,36 @@ mod tests {
         };
         assert_eq!(instance(&lmcp::encode(&state).unwrap()), Some(Instance::of_number(7).hash));
         assert_eq!(instance(b"garbage is carried without a key"), None);
+    }
+
+    #[test]
+    fn seven_parts_are_read_as_the_delimited_form_is() {
+        let mut importer = importer(&["a."]);
+        let parts = |texts: [&'static str; 7]| texts.map(Bytes::from).to_vec();
+        for _ in 0..2 {
+            let read = importer.read_parts(&parts(["a.B", "lmcp", "a.B", "", "100", "61", "x$y|"])).unwrap();
+            let delimited = importer.read(Bytes::from_static(b"a.B$lmcp|a.B||100|61$x$y|")).unwrap();
+            assert_eq!(read, delimited);
+            assert!(importer.read_parts(&parts(["a.B", "lmcp", "a.B", "", "0", "0", "x"])).unwrap().assigned);
+        }
+        let mut refused = |texts| importer.read_parts(&parts(texts)).unwrap_err();
+        assert!(matches!(refused(["a.B", "lmcp", "a.B", "", "300", "61", "x"]), Refused::ForeignEntity(_)));
+        assert!(matches!(refused(["b.B", "lmcp", "b.B", "", "100", "61", "x"]), Refused::Filtered));
+        assert!(matches!(refused(["a.B", "lmcp", "a.B", "", "100", "61", ""]), Refused::Parts(_)));
+        // Delimiters inside a part are no way to write another head.
+        assert!(matches!(refused(["a.B$lmcp", "a.B", "", "100", "61", "", "x"]), Refused::Parts(_)));
+        assert!(matches!(refused(["a.B", "lmcp|a.B", "", "100", "61", "", "x"]), Refused::Parts(_)));
+        assert!(importer.read_parts(&[]).is_err() && importer.read_parts(&parts([""; 7])[..6]).is_err());
+    }
+
+    #[test]
+    fn a_bridge_may_make_everything_its_own() {
+        let mut importer = importer(&[""]).self_generated();
+        for _ in 0..2 {
+            let read = importer.read(Bytes::from_static(b"a.B$lmcp|a.B||300|61$x")).unwrap();
+            assert_eq!(read.message.label.source().to_string(), "eid400sid20");
+            assert!(read.rewritten && !read.assigned);
+        }
     }
 
     #[test]

@@ -10,7 +10,8 @@ impl Node {
     pub(super) fn status(&self, now: Now) -> NodeStatus {
         let uptime = self.started.map(|started| now.monotonic - started).unwrap_or_default();
         let is_bridge = |source| self.bridges.iter().any(|bridge| bridge.spec.source == source);
-        let services = self.services.iter().filter(|hosted| !is_bridge(hosted.spec.source));
+        let here = |hosted: &&crate::host::Hosted| !hosted.is_removed() && !is_bridge(hosted.spec.source);
+        let services = self.services.iter().filter(here);
         let services = services.map(|hosted| ServiceStatus {
             source: hosted.spec.source,
             name: hosted.spec.name.clone(),

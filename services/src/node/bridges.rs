@@ -1,12 +1,12 @@
 //! Bridges and their peers, as events of the node.
 
 use super::{Node, Origin, Work};
-use crate::event::{BridgeEvent, BridgeId, Effect, PeerEvent, PeerId};
+use crate::bridge::Incoming;
+use crate::event::{BadInput, BridgeEvent, BridgeId, Effect, PeerEvent, PeerId};
 use crate::map::uxas::Refused;
 use crate::service::{Component, ComponentHealth, Condition, Level};
 use aldis_envelope::Now;
 use aldis_envelope::codec::stream::StreamError;
-use bytes::Bytes;
 
 impl Node {
     pub(super) fn bridge(&mut self, now: Now, id: BridgeId, event: BridgeEvent, effects: &mut Vec<Effect>) {
@@ -37,13 +37,22 @@ impl Node {
     ) {
         let Some(bridge) = self.bridges.get_mut(id.0) else { return };
         match event {
-            PeerEvent::Message(message) => self.import(now, id, peer, message, effects),
+            PeerEvent::Message(message) => {
+                self.import(now, id, peer, Incoming::Delimited(message), effects);
+            }
+            PeerEvent::Parts(frames) => self.import(now, id, peer, Incoming::Parts(frames), effects),
+            PeerEvent::Unwanted(count) => bridge.unwanted(count),
             PeerEvent::Ready(bytes) => {
                 let ready = bridge.ready(now.monotonic, peer, bytes);
                 effects
                     .extend(ready.into_iter().map(|(label, content)| Effect::Send(id, peer, label, content)));
             }
-            PeerEvent::Bad(error) => self.bad_frame(now, id, peer, error, effects),
+            PeerEvent::Bad(error) => self.bad_input(now, id, peer, &error, effects),
+            PeerEvent::Gives(name) => {
+                let text = format!("{}: {name} is there", bridge.spec.name);
+                bridge.giver_up(peer, name);
+                self.say(now, Level::Information, &text.clone(), text, effects);
+            }
             PeerEvent::Up(name, credit) => {
                 let text = format!("{}: {name} is there", bridge.spec.name);
                 bridge.peer_up(peer, name, credit);
@@ -58,7 +67,7 @@ impl Node {
         }
     }
 
-    fn import(&mut self, now: Now, id: BridgeId, peer: PeerId, message: Bytes, effects: &mut Vec<Effect>) {
+    fn import(&mut self, now: Now, id: BridgeId, peer: PeerId, message: Incoming, effects: &mut Vec<Effect>) {
         match self.bridges[id.0].import(message) {
             Ok(imported) => {
                 self.route(now, Work::new(Origin::Peer(id, peer), imported.message), effects);
@@ -73,17 +82,19 @@ impl Node {
         }
     }
 
-    fn bad_frame(
+    fn bad_input(
         &mut self,
         now: Now,
         id: BridgeId,
         peer: PeerId,
-        error: StreamError,
+        error: &BadInput,
         effects: &mut Vec<Effect>,
     ) {
         let bridge = &mut self.bridges[id.0];
         match error {
-            StreamError::Skipped(bytes) => bridge.counters.bytes_skipped += bytes as u64,
+            BadInput::Stream(StreamError::Skipped(bytes)) => bridge.counters.bytes_skipped += *bytes as u64,
+            BadInput::OneFrame | BadInput::SeveralFrames(_) => bridge.counters.framing_wrong += 1,
+            BadInput::TooLarge { .. } => bridge.counters.too_large += 1,
             _ => bridge.counters.frames_bad += 1,
         }
         let from = bridge.peer_name(peer).to_owned();
@@ -91,7 +102,7 @@ impl Node {
         self.say(
             now,
             Level::Warning,
-            &format!("{name} bad stream"),
+            &format!("{name} bad input"),
             format!("{name}: {from}: {error}"),
             effects,
         );
@@ -121,7 +132,7 @@ struct BridgeIdentity {
 
 fn why_kind(why: &Refused) -> &'static str {
     match why {
-        Refused::Malformed(_) => "malformed",
+        Refused::Malformed(_) | Refused::Parts(_) => "malformed",
         Refused::ForeignEntity(_) => "foreign entity",
         Refused::Filtered => "filtered",
     }

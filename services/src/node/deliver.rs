@@ -255,7 +255,12 @@ impl Node {
         if message.change != Change::Put {
             return;
         }
-        for peer in self.bridges[bridge.0].peers() {
+        if let Origin::Peer(from, _) = origin
+            && self.bridges[from.0].leads_where(&self.bridges[bridge.0])
+        {
+            return;
+        }
+        for peer in self.bridges[bridge.0].takers() {
             if origin != Origin::Peer(bridge, peer) {
                 self.send_to_peer(now, bridge, peer, &message.label, &message.content, effects);
             }

@@ -64,7 +64,7 @@ impl Node {
         }
     }
 
-    fn take_actions(&mut self, now: Now, place: usize, effects: &mut Vec<Effect>) {
+    pub(super) fn take_actions(&mut self, now: Now, place: usize, effects: &mut Vec<Effect>) {
         let source = self.services[place].spec.source;
         // Its memory is kept: a message a round would otherwise cost an allocation.
         let mut actions = std::mem::take(&mut self.actions);
@@ -80,6 +80,8 @@ impl Node {
                 Action::Call(message, within) => self.open_call(now, place, message, within, effects),
                 Action::Job(number, job) => effects.push(Effect::Job(source, number, job)),
                 Action::Note(note) => self.note(now, note, effects),
+                Action::Spawn(spec) => self.spawn(now, source, spec, effects),
+                Action::Stop(other) => self.stop(now, source, other, effects),
                 Action::Retire => {
                     self.services[place].retire();
                     self.links.services_changed();
@@ -216,7 +218,7 @@ impl Node {
         }
     }
 
-    fn service_health(&mut self, now: Now, source: Source, condition: Condition, status: &str) {
+    pub(super) fn service_health(&mut self, now: Now, source: Source, condition: Condition, status: &str) {
         let component = Component::Service(source);
         self.component(now, &ComponentHealth { component, condition, status: status.to_owned() });
     }

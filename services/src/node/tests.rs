@@ -1,6 +1,8 @@
 //! Whole nodes in the simulator: what a fleet must see.
 
+mod bridges;
 mod journal;
+mod life;
 mod links;
 mod sharing;
 
@@ -104,6 +106,8 @@ fn config(entities: &[u64], services: Vec<ServiceSpec>) -> NodeConfig {
 
 fn bridge(entity: u64) -> BridgeSpec {
     BridgeSpec {
+        peer: None,
+        self_generated: false,
         source: source(entity, 20),
         name: "uxas".into(),
         dialect: Dialect::OpenUxas,

@@ -1,6 +1,6 @@
 //! What a service wants done, in the order in which it said so.
 
-use super::{Job, Level, Note};
+use super::{Job, Level, Note, ServiceSpec};
 use aldis_envelope::{
     Address, Call, CallId, ContentType, Descriptor, Envelope, Label, Message, Name, Refusal, Role, Source,
 };
@@ -22,6 +22,10 @@ pub enum Action {
     Note(Note),
     /// End this service.
     Retire,
+    /// Start another service of the same entity.
+    Spawn(ServiceSpec),
+    /// End another service of the same entity, and forget it.
+    Stop(Source),
 }
 
 /// Takes the wishes of a service while it handles an input.
@@ -113,6 +117,16 @@ impl Outbox {
     /// Takes over what another outbox of the same service holds.
     pub(crate) fn push(&mut self, action: Action) {
         self.actions.push(action);
+    }
+
+    /// Starts another service after this input. Its entity must be this one's, and its ids free.
+    pub fn spawn(&mut self, spec: ServiceSpec) {
+        self.actions.push(Action::Spawn(spec));
+    }
+
+    /// Ends another service of the same entity after this input, with last words, and forgets it.
+    pub fn stop(&mut self, source: Source) {
+        self.actions.push(Action::Stop(source));
     }
 
     pub(crate) fn drain(&mut self) -> std::vec::Drain<'_, Action> {

@@ -12,5 +12,6 @@ mod lmcp;
 mod observe;
 mod relay;
 mod run;
+mod serial;
 mod stream;
 mod zenoh_client;

@@ -1,6 +1,6 @@
 //! Frames out of a stream of bytes, whatever pieces it comes in and whatever else it holds.
 
-use super::{BODY_END, HEAD, SIZE_END, TAIL, checksum};
+use super::{BODY_END, CRC_DIGITS, Check, HEAD, SIZE_END, TAIL, checksum};
 use bytes::{Buf, Bytes, BytesMut};
 
 /// The most digits of a size or a checksum: u32::MAX has ten.
@@ -63,6 +63,7 @@ pub struct Reader {
     /// Inside an unfinished body: how far the search for an early end went, and the sum of the bytes up to there.
     searched: usize,
     searched_sum: u32,
+    check: Check,
 }
 
 /// A frame whose head is read and whose body may still be coming.
@@ -81,7 +82,13 @@ impl Reader {
     /// A reader that refuses messages over a limit.
     pub fn new(message_bytes_max: usize) -> Self {
         let (buffer, counters) = (BytesMut::new(), Counters::default());
-        Self { buffer, message_bytes_max, counters, searched: 0, searched_sum: 0 }
+        Self { buffer, message_bytes_max, counters, searched: 0, searched_sum: 0, check: Check::Sum }
+    }
+
+    /// The same reader with a check of its frames.
+    #[must_use]
+    pub fn with_check(self, check: Check) -> Self {
+        Self { check, ..self }
     }
 
     /// Where received bytes are appended. What is buffered stays below one message and one read.
@@ -117,7 +124,7 @@ impl Reader {
         let behind = &self.buffer[HEAD.len()..];
         let mut from = 0;
         while let Some(at) = find(&behind[from..], HEAD) {
-            let mut rest = Reader::new(self.message_bytes_max);
+            let mut rest = Reader::new(self.message_bytes_max).with_check(self.check);
             rest.buffer.extend_from_slice(&behind[from + at..]);
             if matches!(rest.step(), Step::Item(Item::Message(_))) {
                 return Some(self.bad_frame(StreamError::Unfinished(open.size), HEAD.len()));
@@ -187,6 +194,15 @@ impl Reader {
             Trailer::Short => Step::More,
             Trailer::None => Step::Item(self.bad_frame(StreamError::WrongChecksum(open.size), end)),
             Trailer::Whole { declared, length } if declared == u64::from(sum) => {
+                let length = match self.crc(open.body..end, length) {
+                    None => return Step::More,
+                    Some(Ok(digits)) => length + digits,
+                    // What stands in the digits' place may begin the next frame.
+                    Some(Err(())) => {
+                        let error = StreamError::WrongChecksum(open.size);
+                        return Step::Item(self.bad_frame(error, end + length));
+                    }
+                };
                 self.forget_search();
                 self.buffer.advance(open.body);
                 let body = self.buffer.split_to(open.size).freeze();
@@ -198,6 +214,18 @@ impl Reader {
                 Step::Item(self.bad_frame(StreamError::WrongChecksum(open.size), end + length))
             }
         }
+    }
+
+    /// Looks at the CRC after a frame: how many digits it has, or that it does not fit; none until it is there.
+    fn crc(&self, body: std::ops::Range<usize>, trailer: usize) -> Option<Result<usize, ()>> {
+        if self.check == Check::Sum {
+            return Some(Ok(0));
+        }
+        let at = body.end + trailer;
+        let digits = self.buffer.get(at..at + CRC_DIGITS)?;
+        let declared = std::str::from_utf8(digits).ok().and_then(|text| u32::from_str_radix(text, 16).ok());
+        let fits = declared == Some(crc32fast::hash(&self.buffer[body]));
+        Some(if fits { Ok(CRC_DIGITS) } else { Err(()) })
     }
 
     /// While the body is still coming: a trailer whose checksum fits the bytes so far says that the size was wrong, so

@@ -146,3 +146,33 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn damage_that_cancels_out_in_the_sum_is_found_by_the_crc() {
+    let source = Source::new(EntityId::new(100).unwrap(), ServiceId::new(61).unwrap());
+    let label = Arc::new(Label::broadcast(ContentType::Lmcp, Name::new("a.B").unwrap(), source));
+    let written = |check| {
+        let mut out = Vec::new();
+        let mut writer = Writer::new(Dialect::OpenUxas).with_check(check);
+        for _ in 0..3 {
+            writer.write(&label, b"payload", &mut out);
+        }
+        out
+    };
+    let read = |check, bytes: &[u8], piece: usize| {
+        let mut reader = Reader::new(1_000).with_check(check);
+        let mut came = Vec::new();
+        for piece in bytes.chunks(piece) {
+            came.extend(items(&mut reader, piece));
+        }
+        came.into_iter().filter(|item| matches!(item, Item::Message(_))).count()
+    };
+    for check in [Check::Sum, Check::Crc] {
+        let mut bytes = written(check);
+        assert!((1..bytes.len()).all(|piece| read(check, &bytes, piece) == 3), "{check:?}");
+        let at = bytes.windows(7).position(|window| window == b"payload").unwrap();
+        bytes[at] += 1;
+        bytes[at + 1] -= 1;
+        assert_eq!(read(check, &bytes, 5), if check == Check::Sum { 3 } else { 2 });
+    }
+}

@@ -2,16 +2,24 @@
 
 use super::super::exit::Failure;
 use std::net::TcpListener;
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
 /// A process of this program.
 pub(super) struct Process(Child);
 
+fn failed(why: std::io::Error) -> Failure {
+    Failure::Failed(format!("cannot start a second process: {why}"))
+}
+
 impl Process {
     /// Starts this program with other arguments.
     pub(super) fn start(args: &[&str]) -> Result<Self, Failure> {
-        let failed = |why: std::io::Error| Failure::Failed(format!("cannot start a second process: {why}"));
-        let program = std::env::current_exe().map_err(failed)?;
+        Self::start_other(&std::env::current_exe().map_err(failed)?, args)
+    }
+
+    /// Starts another program.
+    pub(super) fn start_other(program: &Path, args: &[&str]) -> Result<Self, Failure> {
         let mut command = Command::new(program);
         command.args(args).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::inherit());
         Ok(Self(command.spawn().map_err(failed)?))

@@ -1,7 +1,7 @@
 //! A sending and a receiving connection, and the frames between them.
 
-use super::super::super::exit::Failure;
-use aldis_envelope::codec::stream::Writer;
+use super::super::exit::Failure;
+use aldis_envelope::codec::{stream, zmtp};
 use aldis_envelope::lmcp::{self, Ref, cmasi};
 use aldis_envelope::{ContentType, Dialect, EntityId, Label, Name, ServiceId, Source};
 use std::io::{ErrorKind, Read, Write};
@@ -16,7 +16,7 @@ const FRAMES: usize = 4;
 /// How long a connection or a message may take.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-fn failed<E: std::fmt::Display>(what: &'static str) -> impl Fn(E) -> Failure {
+pub(super) fn failed<E: std::fmt::Display>(what: &'static str) -> impl Fn(E) -> Failure {
     move |why| Failure::Failed(format!("{what}: {why}"))
 }
 
@@ -27,13 +27,27 @@ pub(super) struct Frames {
 }
 
 impl Frames {
-    pub(super) fn new() -> Result<Self, Failure> {
+    /// Frames of the stream form.
+    pub(super) fn stream() -> Result<Self, Failure> {
+        Self::written(|label, content, out| {
+            stream::Writer::new(Dialect::OpenUxas).write(label, content, out);
+        })
+    }
+
+    /// Messages of ZeroMQ.
+    pub(super) fn zeromq(framing: zmtp::Framing) -> Result<Self, Failure> {
+        Self::written(|label, content, out| {
+            zmtp::Writer::new(framing, Dialect::OpenUxas).write(label, content, None, out);
+        })
+    }
+
+    fn written(write: impl Fn(&Arc<Label>, &[u8], &mut Vec<u8>)) -> Result<Self, Failure> {
         let name = Name::new("afrl.cmasi.AirVehicleState").map_err(failed("name"))?;
         let entity = EntityId::new(400).map_err(failed("id"))?;
         let source = Source::new(entity, ServiceId::new(37).map_err(failed("id"))?);
         let label = Arc::new(Label::broadcast(ContentType::Lmcp, name, source));
         let mut one = Vec::new();
-        Writer::new(Dialect::OpenUxas).write(&label, &state()?, &mut one);
+        write(&label, &state()?, &mut one);
         let write = one.repeat(FRAMES);
         Ok(Self { one, write })
     }
@@ -92,7 +106,11 @@ pub(super) struct Pair {
 impl Pair {
     /// Connects both, and waits until a message passes.
     pub(super) fn connect(to: u16, from: u16, frames: &Frames) -> Result<Self, Failure> {
-        let (receiving, sending) = (connect(from)?, connect(to)?);
+        Self::over(connect(to)?, connect(from)?, frames)
+    }
+
+    /// Takes two connections, and waits until a message passes.
+    pub(super) fn over(sending: TcpStream, receiving: TcpStream, frames: &Frames) -> Result<Self, Failure> {
         let mut pair = Self { sending, receiving, buffer: vec![0; 256 * 1024], at: 0 };
         let until = Instant::now() + PATIENCE;
         let mut sent = 0;
@@ -156,7 +174,8 @@ impl Pair {
     }
 }
 
-fn connect(port: u16) -> Result<TcpStream, Failure> {
+/// Connects to a process that may not have begun to listen yet.
+pub(super) fn connect(port: u16) -> Result<TcpStream, Failure> {
     let until = Instant::now() + PATIENCE;
     loop {
         match TcpStream::connect(("127.0.0.1", port)) {
