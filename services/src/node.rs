@@ -7,6 +7,7 @@ mod journaling;
 mod keeping;
 mod life;
 mod links;
+mod publishing;
 mod running;
 mod sharing;
 

@@ -395,7 +395,7 @@ fn a_job_leaves_the_loop_and_comes_back() {
 fn publishers_are_declared_once_and_within_their_limit() {
     let many: Act = Arc::new(|input, out| {
         if matches!(input, Input::Started | Input::Message(_)) {
-            for i in 0..deliver::PUBLISHERS_MAX + 5 {
+            for i in 0..publishing::PUBLISHERS_MAX + 5 {
                 let label =
                     Label::broadcast(ContentType::Lmcp, Name::new(&format!("t{i}")).unwrap(), out.source());
                 out.send(Message::new(Arc::new(label), Bytes::new()));
@@ -422,7 +422,7 @@ fn publishers_are_declared_once_and_within_their_limit() {
         effects.iter().filter(|e| matches!(e, Effect::Declare { publisher: PublisherId(_), .. })).count()
     };
     let undeclared = effects.iter().filter(|e| matches!(e, Effect::PublishOn(..))).count();
-    assert_eq!(declared(&effects), deliver::PUBLISHERS_MAX);
+    assert_eq!(declared(&effects), publishing::PUBLISHERS_MAX);
     assert!(undeclared >= 5, "{undeclared}");
 }
 
