@@ -17,11 +17,12 @@ const SETTLING: Duration = Duration::from_secs(1);
 
 /// A prepared publisher and the part of its header that never changes.
 pub(super) struct Outlet {
+    /// Before the publisher, which ends what listens for it and complains of none.
+    _listener: MatchingListener<()>,
     publisher: Publisher<'static>,
     constant: Vec<u8>,
     /// Whether somebody listens, as Zenoh said last.
     wanted: Arc<AtomicBool>,
-    _listener: MatchingListener<()>,
     /// How often who is there had changed when this was looked at last.
     changes_seen: u64,
     /// Until when everything goes out; none when that time has passed.
