@@ -38,38 +38,28 @@ fn offer(teams: Vec<Team>) -> Offer {
 
 /// The ordered selections of `count` of these places, in order, at most [`ARRANGEMENTS_MAX`].
 fn arrangements(places: usize, count: usize) -> Vec<Vec<usize>> {
-    let mut found = Vec::new();
-    let mut open: Vec<Vec<usize>> = vec![Vec::new()];
-    while let Some(chosen) = open.pop() {
-        if chosen.len() == count {
-            found.push(chosen);
-            if found.len() == ARRANGEMENTS_MAX {
-                break;
-            }
-            continue;
-        }
-        for next in (0..places).rev().filter(|next| !chosen.contains(next)) {
-            open.push(chosen.iter().copied().chain([next]).collect());
-        }
-    }
-    found
+    chosen(places, count, |so_far, next| !so_far.contains(&next))
 }
 
-/// The selections of `count` of these without order.
+/// The selections of `count` of these without order, likewise.
 fn selections(places: usize, count: usize) -> Vec<Vec<usize>> {
+    chosen(places, count, |so_far, next| so_far.last().is_none_or(|&last| last < next))
+}
+
+/// The selections of `count` of these places that grow by what may follow.
+fn chosen(places: usize, count: usize, may_follow: impl Fn(&[usize], usize) -> bool) -> Vec<Vec<usize>> {
     let mut found = Vec::new();
     let mut open: Vec<Vec<usize>> = vec![Vec::new()];
-    while let Some(chosen) = open.pop() {
-        if chosen.len() == count {
-            found.push(chosen);
+    while let Some(so_far) = open.pop() {
+        if so_far.len() == count {
+            found.push(so_far);
             if found.len() == ARRANGEMENTS_MAX {
                 break;
             }
             continue;
         }
-        let from = chosen.last().map_or(0, |last| last + 1);
-        for next in (from..places).rev() {
-            open.push(chosen.iter().copied().chain([next]).collect());
+        for next in (0..places).rev().filter(|&next| may_follow(&so_far, next)) {
+            open.push(so_far.iter().copied().chain([next]).collect());
         }
     }
     found
