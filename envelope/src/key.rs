@@ -204,6 +204,11 @@ impl Keys {
         }
     }
 
+    /// Where one entity puts the frames of a link to another, by the carrier with this number.
+    pub fn link_frames(&self, from: EntityId, to: EntityId, carrier: u8) -> String {
+        format!("{}/@link/{from}/{to}/{carrier}", self.root)
+    }
+
     /// The liveliness token of a service.
     pub fn alive(&self, source: Source) -> String {
         format!("{}/@alive/{}/{}", self.root, source.entity, source.service)

@@ -97,6 +97,15 @@ fn foreign_keys_are_told_apart() {
 }
 
 #[test]
+fn frames_of_a_link_stand_below_their_sender_and_are_no_envelopes() {
+    let id = |number| EntityId::new(number).unwrap();
+    let key = keys().link_frames(id(400), id(1), 2);
+    assert_eq!(key, "aldis/blue/@link/400/1/2");
+    assert_eq!(keys().of_entity("@link", id(400)), "aldis/blue/@link/400/**");
+    assert!(matches!(keys().parse(&key), Err(KeyError::Foreign(_))));
+}
+
+#[test]
 fn an_id_stands_in_chunks_of_one_form() {
     for chunks in
         ["eid400sid37", "eid400.sid37", "eid400sidall", "eid400/sid37/x", "eid400/.sid37", "eid0400"]

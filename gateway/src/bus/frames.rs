@@ -3,7 +3,7 @@
 use super::session::{BusError, failed, off_the_loop};
 use crate::carrier::Outgoing;
 use crate::runtime::Shared;
-use aldis_envelope::{EntityId, Fleet};
+use aldis_envelope::{EntityId, Fleet, Keys};
 use aldis_services::link::CarrierId;
 use aldis_services::{Event, LinkEvent, LinkId, Place};
 use std::time::Duration;
@@ -37,7 +37,7 @@ pub(crate) struct Channel {
 impl Channel {
     /// What one entity says to another by a carrier.
     fn key(&self, from: EntityId, to: EntityId) -> String {
-        format!("aldis/{}/@link/{from}/{to}/{}", self.fleet, self.carrier.0)
+        Keys::new(&self.fleet).link_frames(from, to, self.carrier.0)
     }
 }
 
