@@ -95,6 +95,11 @@ impl Hosted {
         self.outbox.drain()
     }
 
+    /// Whether the service wants something done.
+    pub(crate) fn has_actions(&self) -> bool {
+        !self.outbox.is_empty()
+    }
+
     /// Ends the service for good.
     pub(crate) fn retire(&mut self) {
         self.service = None;
@@ -160,7 +165,10 @@ impl Hosted {
 
     /// When it wants its deadline, or its restart.
     pub(crate) fn next_deadline(&self) -> Option<Monotonic> {
-        [self.deadline, self.restart_at].into_iter().flatten().min()
+        match (self.deadline, self.restart_at) {
+            (Some(deadline), Some(restart)) => Some(deadline.min(restart)),
+            (deadline, restart) => deadline.or(restart),
+        }
     }
 
     pub(crate) fn wants_deadline(&self, now: Monotonic) -> bool {

@@ -234,12 +234,18 @@ impl Reading {
 
     /// When something is to be asked again.
     pub fn next_deadline(&self) -> Option<Monotonic> {
+        if self.asking.is_empty() {
+            return None;
+        }
         let streams = self.asking.iter().filter_map(|key| self.streams.get(key));
         streams.filter_map(|stream| stream.asked.as_ref()).map(|asked| asked.again).min()
     }
 
     /// How far each stream has been handed over, where that is news to its writer.
     pub fn confirmations(&mut self) -> Vec<(Participant, Confirm)> {
+        if self.unconfirmed.is_empty() {
+            return Vec::new();
+        }
         let mut by_writer: BTreeMap<Participant, Vec<(StreamName, u64)>> = BTreeMap::new();
         for key in std::mem::take(&mut self.unconfirmed) {
             if let Some(stream) = self.streams.get_mut(&key) {

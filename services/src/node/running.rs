@@ -57,7 +57,9 @@ impl Node {
     pub(super) fn settle(&mut self, now: Now, effects: &mut Vec<Effect>) {
         loop {
             while let Some(place) = self.awake.pop_front() {
-                self.take_actions(now, place, effects);
+                if self.services[place].has_actions() {
+                    self.take_actions(now, place, effects);
+                }
             }
             let Some(work) = self.work.pop_front() else { return };
             self.route(now, work, effects);

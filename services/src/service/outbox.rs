@@ -129,6 +129,10 @@ impl Outbox {
         self.actions.push(Action::Stop(source));
     }
 
+    pub(crate) fn is_empty(&self) -> bool {
+        self.actions.is_empty()
+    }
+
     pub(crate) fn drain(&mut self) -> std::vec::Drain<'_, Action> {
         self.actions.drain(..)
     }

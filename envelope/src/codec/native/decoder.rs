@@ -208,9 +208,10 @@ fn read_stamp(known: &Known, rest: &mut Reader<'_>) -> Result<Stamp, HeaderError
     if passed > VIA_MAX as u64 {
         return Err(invalid("via")(format!("{passed} nodes passed, at most {VIA_MAX} are allowed")));
     }
-    let via = (0..passed)
-        .map(|_| EntityId::new(rest.varint("via")?).map_err(invalid("via")))
-        .collect::<Result<_, _>>()?;
+    let mut via = Vec::new();
+    for _ in 0..passed {
+        via.push(EntityId::new(rest.varint("via")?).map_err(invalid("via"))?);
+    }
     let Known { node, boot, priority, .. } = *known;
     Ok(Stamp { node, boot, sequence, source_time, lifespan_left_ms, priority, skipped, via })
 }

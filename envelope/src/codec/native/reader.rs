@@ -31,20 +31,32 @@ impl<'a> Reader<'a> {
         }
     }
 
+    #[inline]
     pub(super) fn varint(&mut self, field: &'static str) -> Result<u64, HeaderError> {
-        let mut number = 0u64;
-        for shift in (0..64).step_by(7) {
-            let byte = self.byte(field)?;
-            let bits = u64::from(byte & 0x7f);
-            if shift == 63 && bits > 1 {
-                break;
+        match self.rest {
+            // Most numbers of a header are this small.
+            [byte, rest @ ..] if *byte < 0x80 => {
+                self.rest = rest;
+                Ok(u64::from(*byte))
             }
-            number |= bits << shift;
+            _ => self.long_varint(field),
+        }
+    }
+
+    fn long_varint(&mut self, field: &'static str) -> Result<u64, HeaderError> {
+        let (mut number, mut shift) = (0u64, 0);
+        for (place, &byte) in self.rest.iter().enumerate() {
+            if shift == 63 && byte > 1 {
+                return Err(HeaderError::Invalid { field, why: "a number over 64 bits".into() });
+            }
+            number |= u64::from(byte & 0x7f) << shift;
             if byte < 0x80 {
+                self.rest = &self.rest[place + 1..];
                 return Ok(number);
             }
+            shift += 7;
         }
-        Err(HeaderError::Invalid { field, why: "a number over 64 bits".into() })
+        Err(HeaderError::Truncated(field))
     }
 
     pub(super) fn varint_u32(&mut self, field: &'static str) -> Result<u32, HeaderError> {
