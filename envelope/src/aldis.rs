@@ -1,6 +1,7 @@
 //! Requests and answers of Aldis's own services: content type `aldis`, postcard's format.
 
 pub mod dds;
+pub mod entities;
 pub mod link;
 
 use crate::guid::Guid;

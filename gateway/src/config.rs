@@ -16,6 +16,7 @@ mod journal;
 mod link;
 mod locator;
 mod read;
+mod recorder;
 mod resource;
 mod schema;
 mod send_messages;

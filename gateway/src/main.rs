@@ -9,6 +9,7 @@ mod cli;
 mod clock;
 mod config;
 mod journal;
+mod recording;
 mod runtime;
 
 fn main() -> std::process::ExitCode {

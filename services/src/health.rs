@@ -42,6 +42,11 @@ impl Health {
             }
             return;
         }
+        if self.own.len() >= RESOURCES_MAX && !self.own.contains_key(&health.component) {
+            let text =
+                format!("{RESOURCES_MAX} parts report their health: {:?} is one too many", health.component);
+            return out.note(Level::Warning, text);
+        }
         let (resource_id, code) = match &health.component {
             Component::Service(source) => (self.guids.of_service(*source), ErrorCode::Software),
             Component::Resource("disk") => {

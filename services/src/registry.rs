@@ -1,9 +1,11 @@
 //! Every service that a node can run, by its kind. A new service is one line here.
 
+use crate::entities::Entities;
 use crate::health::Health;
 use crate::log::Log;
 use crate::manager::{Maker, Manager};
 use crate::player::{Player, Scheduled};
+use crate::recorder::{Recorder, Recording};
 use crate::service::{Input, Outbox, Service, ServiceSpec};
 use crate::track::{Track, TrackConfig};
 use crate::umaa::allocation::{Arbiter, Arbitration};
@@ -34,6 +36,10 @@ pub enum Kind {
     Manager(Maker),
     /// Sends prepared messages.
     Player(Vec<Scheduled>),
+    /// Keeps what comes by in files.
+    Recorder(Recording),
+    /// Holds the latest state of each vehicle that it hears of.
+    Entities,
 }
 
 /// Stands where the host answers for itself: for the node at service 1, and for each bridge.
@@ -83,6 +89,8 @@ pub fn service(source: Source, name: &str, kind: Kind, guids: &Guids) -> Service
             Kind::Arbiter(arbitration) => Box::new(Arbiter::new(source, &guids, arbitration.clone())),
             Kind::Manager(maker) => Box::new(Manager::new(source, maker.clone())),
             Kind::Player(messages) => Box::new(Player::new(source, messages.clone())),
+            Kind::Recorder(recording) => Box::new(Recorder::new(recording.clone())),
+            Kind::Entities => Box::new(Entities::default()),
             Kind::Track(track) => Box::new(Track::new(source, track.clone())),
             Kind::Core(core) => core.service(),
         }

@@ -1,5 +1,7 @@
 //! `aldis fleet`: who is there.
 
+mod states;
+
 use super::content::status_text;
 use super::exit::Failure;
 use super::member::{Desk, Join, Member};
@@ -16,8 +18,15 @@ use std::time::Duration;
 
 /// Show who is there: the services alive on each entity, and what their nodes say of themselves.
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  aldis fleet\n  aldis fleet --json")]
+#[command(after_help = "\
+Examples:
+  aldis fleet
+  aldis fleet --json
+  aldis fleet --states          where the vehicles are, and how old that is; asks every service of the kind `entity-states`")]
 pub(crate) struct FleetArgs {
+    /// Show the latest state of each vehicle, as services of the kind `entity-states` hold them, with its age.
+    #[arg(long)]
+    states: bool,
     /// How long to wait for the nodes' answers: `2s`, `500ms`.
     #[arg(long, default_value = "2s")]
     within: Within,
@@ -86,6 +95,9 @@ impl Desk for Survey {
 
 impl FleetArgs {
     pub(crate) fn run(self) -> Result<(), Failure> {
+        if self.states {
+            return states::show(&self.join, self.within.0, self.json);
+        }
         let (tell, told) = mpsc::channel();
         let survey = Survey { seen: Seen::default(), waiting: BTreeSet::new(), within: self.within.0, tell };
         let member = Member::join(&self.join, Vec::new(), survey)?;

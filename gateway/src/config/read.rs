@@ -7,6 +7,7 @@ use super::bridge::{Bridge, UxasSerial, UxasSerialTable, UxasTcp, UxasTcpTable, 
 use super::check;
 use super::cure::{nearest, split};
 use super::error::{ConfigError, Fault};
+use super::recorder::{EntityStates, Recorder};
 use super::send_messages::SendMessages;
 use super::service::{Service, ServiceManager, Track, named_service};
 use miette::NamedSource;
@@ -42,11 +43,15 @@ pub(super) fn read_files(
     let source = Arc::new(NamedSource::new(file, text.to_owned()));
     let mut mistakes = Vec::new();
     for (index, service) in config.services.iter_mut().enumerate() {
-        if let Service::SendMessages(send) = service
-            && let Err(fault) = send.read(base)
-        {
-            let fault = fault.below(&format!("service.{index}"));
-            mistakes.push(located(&source, text, Mistake::Fault(fault)));
+        match service {
+            Service::SendMessages(send) => {
+                if let Err(fault) = send.read(base) {
+                    let fault = fault.below(&format!("service.{index}"));
+                    mistakes.push(located(&source, text, Mistake::Fault(fault)));
+                }
+            }
+            Service::Recorder(recorder) => recorder.stand(base),
+            _ => {}
         }
     }
     ConfigError::all(mistakes).map_or(Ok(()), Err)
@@ -124,6 +129,15 @@ fn service(element: Element<'_>, index: usize) -> Result<Service, Mistake> {
         "send-messages" => {
             let send = typed::<SendMessages>(table)?.check();
             Ok(Service::SendMessages(send.map_err(|f| Mistake::Fault(f.below(&path)))?))
+        }
+        "recorder" => {
+            let recorder = typed::<Recorder>(table)?.check();
+            Ok(Service::Recorder(recorder.map_err(|f| Mistake::Fault(f.below(&path)))?))
+        }
+        "entity-states" => {
+            let states = typed::<EntityStates>(table)?;
+            named_service(states.service).map_err(|f| Mistake::Fault(f.below(&path)))?;
+            Ok(Service::EntityStates(states))
         }
         other => core(other, table, &path),
     }

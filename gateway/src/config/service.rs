@@ -2,6 +2,7 @@
 
 use super::bridge::in_range;
 use super::error::Fault;
+use super::recorder::{EntityStates, Recorder};
 use super::schema;
 use super::send_messages::SendMessages;
 use super::uxas::{self, CoreTable};
@@ -43,6 +44,10 @@ pub(crate) enum Service {
     SendMessages(SendMessages),
     /// Starts and ends services when UxAS asks for it, and tells who comes and goes.
     ServiceManager(ServiceManager),
+    /// Keeps what comes by in files.
+    Recorder(Recorder),
+    /// Holds the latest state of each vehicle.
+    EntityStates(EntityStates),
 }
 
 impl Service {
@@ -51,6 +56,8 @@ impl Service {
         "track",
         "send-messages",
         "service-manager",
+        "recorder",
+        "entity-states",
         "automation-request-validator",
         "task-manager",
         "sensor-manager",
@@ -67,6 +74,7 @@ impl Service {
     pub(crate) fn core(&self) -> Option<&dyn CoreTable> {
         Some(match self {
             Self::Track(_) | Self::SendMessages(_) | Self::ServiceManager(_) => return None,
+            Self::Recorder(_) | Self::EntityStates(_) => return None,
             Self::AutomationRequestValidator(table) => table,
             Self::TaskManager(table) => table,
             Self::SensorManager(table) => table,
@@ -86,6 +94,8 @@ impl Service {
             Self::Track(track) => track.service,
             Self::SendMessages(send) => send.service,
             Self::ServiceManager(manager) => manager.service,
+            Self::Recorder(recorder) => recorder.service,
+            Self::EntityStates(states) => states.service,
             core => core.core().and_then(CoreTable::service).unwrap_or(ServiceId::NODE),
         }
     }
@@ -94,7 +104,9 @@ impl Service {
     pub(crate) fn entity(&self) -> Option<EntityId> {
         match self {
             Self::Track(track) => track.entity,
-            Self::SendMessages(_) | Self::ServiceManager(_) => None,
+            Self::SendMessages(_) | Self::ServiceManager(_) | Self::Recorder(_) | Self::EntityStates(_) => {
+                None
+            }
             core => core.core().and_then(CoreTable::entity),
         }
     }

@@ -8,11 +8,12 @@ use crate::carrier::{serial, udp};
 use crate::clock;
 use crate::config::{self, Config, bus};
 use aldis_envelope::codec::{stream, zmtp};
-use aldis_envelope::{EntityId, Guids, Prefix, Source};
+use aldis_envelope::{EntityId, Fleet, Guids, Prefix, Source};
 use aldis_services::LinkId;
 use aldis_services::journal::JournalConfig;
 use aldis_services::link::{CarrierId, LinkKey};
 use aldis_services::manager::Maker;
+use aldis_services::recorder::Recording;
 use aldis_services::registry::{self, Kind};
 use aldis_services::uxas::Core;
 use aldis_services::{BridgeSpec, NodeConfig, ServiceSpec};
@@ -176,7 +177,7 @@ pub(crate) fn node_config(config: &Config) -> NodeConfig {
     let guids = Guids::new(&config.fleet, config.guid);
     let mut services = registry::built_in(own, &guids, config.health.report_period());
     services.extend(config.arbitration().map(|arbitration| registry::arbiter(own, &guids, arbitration)));
-    services.extend(config.services.iter().map(|service| configured(own, service, &guids)));
+    services.extend(config.services.iter().map(|service| configured(&config.fleet, own, service, &guids)));
     NodeConfig {
         fleet: config.fleet.clone(),
         entities: config.entities.iter().collect(),
@@ -195,34 +196,44 @@ pub(crate) fn node_config(config: &Config) -> NodeConfig {
 }
 
 /// Makes a service from what a `CreateNewService` says: the beginning of an element of a UxAS configuration.
-fn maker(own: EntityId, guids: &Guids) -> Maker {
-    let guids = guids.clone();
+fn maker(fleet: &Fleet, own: EntityId, guids: &Guids) -> Maker {
+    let (fleet, guids) = (fleet.clone(), guids.clone());
     Maker::new(move |source, create| {
         let id = source.service.get();
         let service = config::uxas_file::service(&create.xml_configuration, own.get(), id)?;
         match &service {
             config::Service::SendMessages(_) => Err("files are read at the start of a node alone".to_owned()),
-            service => Ok(configured(own, service, &guids)),
+            service => Ok(configured(&fleet, own, service, &guids)),
         }
     })
 }
 
-fn configured(own: EntityId, service: &config::Service, guids: &Guids) -> ServiceSpec {
+fn configured(fleet: &Fleet, own: EntityId, service: &config::Service, guids: &Guids) -> ServiceSpec {
     let source = Source::new(service.entity().unwrap_or(own), service.service());
     match service {
         config::Service::Track(track) => {
             registry::service(track.source(own), "track", Kind::Track(track.motion(own)), guids)
         }
         config::Service::ServiceManager(manager) => {
-            let kind = Kind::Manager(maker(own, guids));
+            let kind = Kind::Manager(maker(fleet, own, guids));
             registry::service(Source::new(own, manager.service), "service-manager", kind, guids)
         }
         config::Service::SendMessages(send) => {
             let kind = Kind::Player(send.scheduled.clone());
             registry::service(Source::new(own, send.service), "send-messages", kind, guids)
         }
+        config::Service::Recorder(recorder) => {
+            let kind = Kind::Recorder(Recording {
+                fleet: fleet.clone(),
+                addresses: recorder.addresses.clone(),
+                messages_per_file: recorder.messages_per_file,
+                write: crate::recording::writer(&recorder.directory),
+            });
+            registry::service(source, "recorder", kind, guids)
+        }
+        config::Service::EntityStates(_) => registry::service(source, "entity-states", Kind::Entities, guids),
         core => {
-            // All that is no track is a core service.
+            // All others are core services.
             let core = core.core().map(|table| table.core(source.entity));
             let name = core.as_ref().map_or("none", Core::name);
             registry::service(source, name, core.map_or(Kind::Node, Kind::Core), guids)

@@ -1,38 +1,35 @@
-//! What services of UxAS say of themselves, as health reports of UMAA (ICD 5.1.1).
+//! What services of UxAS say of themselves, as the health of a part of the node that a bridge leads to (ICD 5.1.1).
 
+use crate::service::{Component, ComponentHealth, Condition};
 use aldis_envelope::lmcp::cmasi::{ServiceStatus, ServiceStatusType};
-use aldis_envelope::umaa::{ErrorCode, ErrorCondition, HealthReport, LongDescription};
-use aldis_envelope::{Guids, Source, Wall};
+use aldis_envelope::{ContentType, Message, Source, lmcp};
 
-/// The health of the service that sent a status, reported by another one.
-///
-/// An error impairs the service, a warning warns, an information says that all is well; what is told in words is the keys and
-/// values of the status, in their order. A status knows no time of its own, so the report has that of its coming.
-pub fn health_report(
-    status: &ServiceStatus,
-    of: Source,
-    reporter: Source,
-    guids: &Guids,
-    came: Wall,
-) -> HealthReport {
-    let severity = match status.status_type {
-        ServiceStatusType::Error => ErrorCondition::Error,
-        ServiceStatusType::Warning => ErrorCondition::Warn,
-        _ => ErrorCondition::None,
-    };
-    let code = if severity == ErrorCondition::None { ErrorCode::None } else { ErrorCode::Software };
-    HealthReport {
-        code,
-        log_time: came.into(),
-        severity,
-        status: LongDescription::shortened(&in_words(status, of)),
-        time_stamp: came.into(),
-        source: guids.of_service(reporter),
-        resource_id: guids.of_service(of),
+/// The type that is heard, and under which it is broadcast.
+const STATUS: &str = "afrl.cmasi.ServiceStatus";
+
+/// The health that a message tells; none where it is no status of a service, or one that cannot be read.
+pub fn told(message: &Message) -> Option<ComponentHealth> {
+    let label = &message.label;
+    if label.descriptor() != STATUS || label.attributes.content_type != ContentType::Lmcp {
+        return None;
     }
+    lmcp::decode_as::<ServiceStatus>(&message.content).ok().map(|status| health(&status, label.source()))
 }
 
-fn in_words(status: &ServiceStatus, of: Source) -> String {
+/// The health of the service that sent a status.
+///
+/// With an error it has failed at something, with a warning it is degraded, an information says that all is well; what is told in words
+/// is the keys and values of the status, in their order.
+pub fn health(status: &ServiceStatus, of: Source) -> ComponentHealth {
+    let condition = match status.status_type {
+        ServiceStatusType::Error => Condition::Failed,
+        ServiceStatusType::Warning => Condition::Degraded,
+        _ => Condition::Well,
+    };
+    ComponentHealth { component: Component::Service(of), condition, status: in_words(status) }
+}
+
+fn in_words(status: &ServiceStatus) -> String {
     let told = status.info.iter().filter_map(|info| info.get());
     let told: Vec<_> = told
         .map(|info| match (info.key.as_str(), info.value.as_str()) {
@@ -41,20 +38,18 @@ fn in_words(status: &ServiceStatus, of: Source) -> String {
             (key, value) => format!("{key}: {value}"),
         })
         .collect();
-    match told.as_slice() {
-        [] => of.to_string(),
-        told => format!("{of}: {}", told.join("; ")),
-    }
+    if told.is_empty() { "says no more".into() } else { told.join("; ") }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use aldis_envelope::lmcp::{Ref, cmasi::KeyValuePair};
-    use aldis_envelope::{EntityId, Fleet, GuidForm, ServiceId};
+    use aldis_envelope::{EntityId, Label, Name, ServiceId};
+    use std::sync::Arc;
 
-    fn source(service: u64) -> Source {
-        Source::new(EntityId::new(100).unwrap(), ServiceId::new(service).unwrap())
+    fn source() -> Source {
+        Source::new(EntityId::new(100).unwrap(), ServiceId::new(61).unwrap())
     }
 
     fn status(status_type: ServiceStatusType, info: &[(&str, &str)]) -> ServiceStatus {
@@ -65,25 +60,29 @@ mod tests {
 
     #[test]
     fn an_error_is_told_with_who_failed_and_why() {
-        let guids = Guids::new(&Fleet::new("blue").unwrap(), GuidForm::Readable);
-        let report = |status: &ServiceStatus| {
-            health_report(status, source(61), source(2), &guids, Wall(1_500_000_007))
+        let error = status(ServiceStatusType::Error, &[("RequestID", "7"), ("no region", "")]);
+        let health = health(&error, source());
+        assert_eq!((health.component, health.condition), (Component::Service(source()), Condition::Failed));
+        assert_eq!(health.status, "RequestID: 7; no region");
+    }
+
+    #[test]
+    fn warnings_degrade_and_informations_say_that_all_is_well() {
+        let warning = health(&status(ServiceStatusType::Warning, &[]), source());
+        assert_eq!((warning.condition, warning.status.as_str()), (Condition::Degraded, "says no more"));
+        let well = health(&status(ServiceStatusType::Information, &[("", "started")]), source());
+        assert_eq!((well.condition, well.status.as_str()), (Condition::Well, "started"));
+    }
+
+    #[test]
+    fn a_message_tells_it_where_it_is_a_status() {
+        let message = |name: &str, content: Vec<u8>| {
+            let label = Label::broadcast(ContentType::Lmcp, Name::new(name).unwrap(), source());
+            told(&Message::new(Arc::new(label), content.into()))
         };
-        let error = report(&status(ServiceStatusType::Error, &[("RequestID", "7"), ("no region", "")]));
-        assert_eq!((error.severity, error.code), (ErrorCondition::Error, ErrorCode::Software));
-        assert_eq!(error.status.as_str(), "eid100sid61: RequestID: 7; no region");
-        assert_eq!(
-            (error.resource_id, error.source),
-            (guids.of_service(source(61)), guids.of_service(source(2)))
-        );
-        assert_eq!(Wall::from(error.time_stamp), Wall(1_500_000_007));
-        let warning = report(&status(ServiceStatusType::Warning, &[]));
-        assert_eq!((warning.severity, warning.status.as_str()), (ErrorCondition::Warn, "eid100sid61"));
-        let well = report(&status(ServiceStatusType::Information, &[("", "started")]));
-        assert_eq!((well.severity, well.code), (ErrorCondition::None, ErrorCode::None));
-        let mut long = status(ServiceStatusType::Error, &[]);
-        long.info =
-            vec![Ref::new(KeyValuePair { key: "é".repeat(5_000).as_str().into(), ..Default::default() })];
-        assert!(report(&long).status.as_str().len() <= LongDescription::MAX);
+        let status = lmcp::encode(&status(ServiceStatusType::Error, &[])).unwrap();
+        assert_eq!(message(STATUS, status.clone()).map(|health| health.condition), Some(Condition::Failed));
+        assert_eq!(message("afrl.cmasi.KeyValuePair", status.clone()), None);
+        assert_eq!(message(STATUS, status[..20].to_vec()), None);
     }
 }

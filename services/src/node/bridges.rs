@@ -3,7 +3,7 @@
 use super::{Node, Origin, Work};
 use crate::bridge::Incoming;
 use crate::event::{BadInput, BridgeEvent, BridgeId, Effect, PeerEvent, PeerId};
-use crate::map::uxas::Refused;
+use crate::map::{self, uxas::Refused};
 use crate::service::{Component, ComponentHealth, Condition, Level};
 use aldis_envelope::Now;
 use aldis_envelope::codec::stream::StreamError;
@@ -70,6 +70,9 @@ impl Node {
     fn import(&mut self, now: Now, id: BridgeId, peer: PeerId, message: Incoming, effects: &mut Vec<Effect>) {
         match self.bridges[id.0].import(message) {
             Ok(imported) => {
+                if let Some(health) = map::health::told(&imported.message) {
+                    self.component(now, &health);
+                }
                 self.route(now, Work::new(Origin::Peer(id, peer), imported.message), effects);
             }
             Err(Refused::Filtered) => {}

@@ -14,4 +14,5 @@ mod relay;
 mod run;
 mod serial;
 mod stream;
+mod uxas;
 mod zenoh_client;

@@ -114,11 +114,11 @@ const ROWS: &[Row] = &[
     },
     Row {
         names: &["MessageLoggerDataService"],
-        here: Nothing("`aldis record FILE afrl uxas` keeps messages, and `aldis replay` sends them again"),
+        here: Service("recorder"),
         attributes: &[
-            ("LogFileName", Value::Nothing("")),
-            ("LogFileMessageCountLimit", Value::Nothing("")),
-            ("FilesPerSubDirectory", Value::Nothing("")),
+            ("LogFileName", Value::Nothing("files are named by their times")),
+            ("LogFileMessageCountLimit", Number("messages_per_file")),
+            ("FilesPerSubDirectory", Value::Nothing("all files stand in one directory")),
         ],
     },
     Row {
@@ -217,6 +217,7 @@ fn attributes(element: &Element, row: &Row, import: &mut Import<'_>) {
     match row.here {
         Service("send-messages") => messages(element, import),
         Service("task-manager") => options(element, import),
+        Service("recorder") => kept(element, import),
         _ => {
             for child in &element.children {
                 let text = format!("`{}` of {} is not understood", child.name, element.title());
@@ -224,6 +225,25 @@ fn attributes(element: &Element, row: &Row, import: &mut Import<'_>) {
             }
         }
     }
+}
+
+/// What is recorded, into the directory where OpenUxAS keeps it: below that in which the program was started.
+fn kept(element: &Element, import: &mut Import<'_>) {
+    let directory = PathBuf::from("datawork/SavedMessages");
+    let directory = std::path::absolute(&directory).unwrap_or(directory);
+    import.out.key("directory", quoted(&directory.display().to_string()));
+    let mut addresses = Vec::new();
+    for child in &element.children {
+        match child.attribute("MessageType").filter(|_| child.name == "LogMessage") {
+            Some(kind) => addresses.push(quoted(kind)),
+            None => import.remark(child.line, format!("`{}` names no `MessageType`", child.name)),
+        }
+        if child.attribute("NumberMessagesToSkip").is_some_and(|count| count.trim() != "0") {
+            let text = format!("`NumberMessagesToSkip` of {}: every message is kept", child.title());
+            import.remark(child.line, text);
+        }
+    }
+    import.out.key("addresses", format!("[{}]", addresses.join(", ")));
 }
 
 /// Options of tasks, one for each `Option` of a `TaskOptions`.
