@@ -1,6 +1,6 @@
 //! Sound inputs: objects of all types in each form, headers, frames.
 
-use aldis_envelope::codec::{native, stream};
+use aldis_envelope::codec::{native, stream, zmtp};
 use aldis_envelope::lmcp::{Kind, Object, Slot, TypeInfo, descendants, encode, to_json, to_xml, types};
 use aldis_envelope::{
     Address, BootId, Call, CallId, ContentType, Descriptor, Dialect, EntityId, Envelope, Label, Message,
@@ -28,6 +28,8 @@ pub(crate) struct Corpus {
     pub(crate) headers: Vec<Vec<u8>>,
     pub(crate) delimited: Vec<Vec<u8>>,
     pub(crate) frames: Vec<Vec<u8>>,
+    /// What a peer that pushes sends, and what one that subscribes sends.
+    pub(crate) zmtp: Vec<Vec<u8>>,
 }
 
 impl Corpus {
@@ -62,9 +64,27 @@ impl Corpus {
                 stream::Writer::new(dialect(&mut random)).write(label, content, &mut frames);
             }
             corpus.frames.push(frames);
+            corpus.zmtp.push(connection(&mut random, label, content));
         }
         Ok(corpus)
     }
+}
+
+/// All that one end of a ZeroMQ connection says: a PUSH that sends messages, or a SUB that subscribes.
+fn connection(random: &mut Rng, label: &Arc<Label>, content: &[u8]) -> Vec<u8> {
+    let mut said = zmtp::GREETING.to_vec();
+    if random.u8(..8) == 0 {
+        said.extend(zmtp::ready(zmtp::SocketType::Sub));
+        (0..random.usize(1..4)).for_each(|_| said.extend(zmtp::subscription(label.descriptor().as_bytes())));
+        return said;
+    }
+    said.extend(zmtp::ready(zmtp::SocketType::Push));
+    let framing = if random.bool() { zmtp::Framing::Single } else { zmtp::Framing::Multipart };
+    let mut writer = zmtp::Writer::new(framing, dialect(random));
+    for _ in 0..random.usize(1..4) {
+        writer.write(label, content, None, &mut said);
+    }
+    said
 }
 
 fn dialect(random: &mut Rng) -> Dialect {

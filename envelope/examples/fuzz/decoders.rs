@@ -1,7 +1,7 @@
 //! What is fed: each decoder of this crate, with what holds when it accepts an input.
 
 use crate::corpus::Corpus;
-use aldis_envelope::codec::{delimited, multipart, native, stream};
+use aldis_envelope::codec::{delimited, multipart, native, stream, zmtp};
 use aldis_envelope::lmcp::{self, Header, natural_key, position};
 use aldis_envelope::{Fleet, Keys};
 use bytes::Bytes;
@@ -31,12 +31,13 @@ pub(crate) struct Decoder {
     pub(crate) read: fn(&[u8], &mut Watch<'_>) -> Outcome,
 }
 
-pub(crate) const DECODERS: [Decoder; 7] = [
+pub(crate) const DECODERS: [Decoder; 8] = [
     Decoder { name: "lmcp", samples: |it| &it.lmcp, mend: Some(mend_lmcp), read: read_lmcp },
     Decoder { name: "native", samples: |it| &it.headers, mend: None, read: read_native },
     Decoder { name: "delimited", samples: |it| &it.delimited, mend: None, read: read_delimited },
     Decoder { name: "multipart", samples: |it| &it.delimited, mend: None, read: read_multipart },
     Decoder { name: "stream", samples: |it| &it.frames, mend: None, read: read_stream },
+    Decoder { name: "zmtp", samples: |it| &it.zmtp, mend: Some(mend_zmtp), read: read_zmtp },
     Decoder { name: "json", samples: |it| &it.json, mend: None, read: read_json },
     Decoder { name: "xml", samples: |it| &it.xml, mend: None, read: read_xml },
 ];
@@ -119,6 +120,33 @@ fn read_stream(input: &[u8], watch: &mut Watch<'_>) -> Outcome {
         }
     });
     if messages > 0 { Outcome::Accepted } else { Outcome::Refused }
+}
+
+/// The greeting and the handshake of seven inputs in eight: what is wrong there hides all that follows.
+fn mend_zmtp(random: &mut Rng, input: &mut [u8]) {
+    let socket = if random.bool() { zmtp::SocketType::Push } else { zmtp::SocketType::Sub };
+    let begin = [&zmtp::GREETING[..], &zmtp::ready(socket)].concat();
+    if input.len() > begin.len() && random.u8(..8) > 0 {
+        input[..begin.len()].copy_from_slice(&begin);
+    }
+}
+
+/// Two pieces, to the end that fits what the peer calls itself.
+fn read_zmtp(input: &[u8], watch: &mut Watch<'_>) -> Outcome {
+    let subscribes = input.windows(3).take(120).any(|part| part == b"SUB");
+    let own = if subscribes { zmtp::SocketType::Pub } else { zmtp::SocketType::Pull };
+    let mut items = 0;
+    watch(&mut || {
+        let mut reader = zmtp::Reader::new(own, 32 * 1024);
+        let (first, second) = input.split_at(input.len() / 2);
+        for piece in [first, second] {
+            reader.buffer().extend_from_slice(piece);
+            while let Ok(Some(_)) = reader.next_item() {
+                items += 1;
+            }
+        }
+    });
+    if items > 1 { Outcome::Accepted } else { Outcome::Refused }
 }
 
 fn read_json(input: &[u8], watch: &mut Watch<'_>) -> Outcome {
