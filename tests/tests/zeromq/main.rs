@@ -1,6 +1,7 @@
 //! A node and a foreign ZeroMQ: libzmq, by its binding for Python. Sockets that connect, sockets that bind, both framings.
 
 mod peer;
+mod waterway;
 
 use aldis_tests::{Node, Site, free_port};
 use peer::{Uxas, pyzmq};
@@ -20,6 +21,11 @@ const HEAD: &str = "afrl.cmasi.KeyValuePair$lmcp|afrl.cmasi.KeyValuePair||1|61$"
 impl Stage {
     /// A node with sockets of these names: those that others connect to, or those that connect.
     fn new([into, out]: [&str; 2], framing: &str, more: &str) -> Option<Self> {
+        Self::of_entity(1, [into, out], framing, more)
+    }
+
+    /// The same as another entity beside shore.
+    fn of_entity(entity: u64, [into, out]: [&str; 2], framing: &str, more: &str) -> Option<Self> {
         let python = pyzmq()?;
         let (site, ports) = (Site::new(), [free_port(), free_port()]);
         let bridge = format!(
@@ -27,8 +33,14 @@ impl Stage {
              {into} = \"127.0.0.1:{}\"\n{out} = \"127.0.0.1:{}\"\n{more}\n",
             ports[0], ports[1]
         );
-        let node = Node::start(&site.shore_config(&bridge));
-        site.wait_for(1);
+        let config = site.shore_config(&bridge);
+        if entity != 1 {
+            let text = std::fs::read_to_string(&config).expect("it was written");
+            let text = text.replace("\nentities = [1]\n", &format!("\nentities = [{entity}, 1]\n"));
+            site.directory().write("shore.toml", &text);
+        }
+        let node = Node::start(&config);
+        site.wait_for(entity);
         Some(Self { site, node, ports, python })
     }
 
