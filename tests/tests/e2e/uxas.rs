@@ -132,8 +132,7 @@ fn states_are_held_with_their_ages_and_recorded_and_errors_of_services_are_healt
     let site = Site::new();
     let kept = site.directory().path().join("kept");
     let more = format!(
-        "[[service]]\nkind = \"entity-states\"\nservice = 120\n\
-         [[service]]\nkind = \"recorder\"\nservice = 121\ndirectory = \"{}\"\naddresses = [\"afrl\"]\nmessages_per_file = 2\n",
+        "[[service]]\nkind = \"recorder\"\nservice = 121\ndirectory = \"{}\"\naddresses = [\"afrl\"]\nmessages_per_file = 2\n",
         kept.display()
     );
     let mut node = Node::start(&site.shore_config(&more));
