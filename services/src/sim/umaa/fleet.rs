@@ -282,10 +282,10 @@ impl Workload for UmaaFleet {
             .into_iter()
             .map(|(source, make)| {
                 let (lives, seed) = (AtomicU64::new(0), random.u64(..));
-                let tamper = self.tamper_of(source, arrangement);
+                let (facts, tamper) = (facts.clone(), self.tamper_of(source, arrangement));
                 let factory = Arc::new(move || -> Box<dyn Service> {
                     let inner = make(seed.wrapping_add(lives.fetch_add(1, Ordering::Relaxed)));
-                    Box::new(Tampered::new(source, inner, tamper()))
+                    Box::new(Tampered::new(source, inner, tamper(), facts.clone()))
                 });
                 ServiceSpec { source, name: "umaa".into(), factory }
             })

@@ -2,18 +2,38 @@
 
 use super::tamper::Tamper;
 use crate::service::{Action, Input, Outbox, Service};
+use crate::sim::observe::{Fact, Facts};
 use aldis_envelope::{Monotonic, Now, Prefix, Source};
+
+/// A life of a service has ended; others see that its token is withdrawn.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct LifeEnded(pub(super) Source);
+
+impl Fact for LifeEnded {}
 
 /// A service with what stands in its way.
 pub(super) struct Tampered {
+    source: Source,
     inner: Box<dyn Service>,
     outbox: Outbox,
     tamper: Box<dyn Tamper>,
+    facts: Facts,
+}
+
+impl Drop for Tampered {
+    fn drop(&mut self) {
+        self.facts.tell(LifeEnded(self.source));
+    }
 }
 
 impl Tampered {
-    pub(super) fn new(source: Source, inner: Box<dyn Service>, tamper: Box<dyn Tamper>) -> Self {
-        Self { inner, outbox: Outbox::new(source), tamper }
+    pub(super) fn new(
+        source: Source,
+        inner: Box<dyn Service>,
+        tamper: Box<dyn Tamper>,
+        facts: Facts,
+    ) -> Self {
+        Self { source, inner, outbox: Outbox::new(source), tamper, facts }
     }
 
     fn give(&mut self, now: Now, input: Input<'_>, out: &mut Outbox) {

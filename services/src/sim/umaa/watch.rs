@@ -2,6 +2,7 @@
 
 use super::commands::{RudderCommand, VectorCommand, VectorExecutionStatus};
 use super::outside::entity_of;
+use super::tampered::LifeEnded;
 use super::wrote::Wrote;
 use crate::conform::{self, Bounds, Decoder, Monitor, Watcher};
 use crate::sim::observe::{Checker, Observation, Seen};
@@ -102,6 +103,9 @@ impl Checker for Watch {
             Seen::Fact(fact) => {
                 if let Some(Wrote(envelope)) = fact.downcast() {
                     self.wrote(observation.at, envelope);
+                }
+                if let (Some(LifeEnded(of)), Some(watcher)) = (fact.downcast(), &mut self.watcher) {
+                    watcher.vanished(observation.at, *of);
                 }
             }
             // What the services write that every node has outlives no process; it is judged as far as the bus carries it.

@@ -143,7 +143,7 @@ fn what_was_retained_before_is_believed_once_it_is_repeated() {
     let guard = Guard::new(source(400, 100), guids(), GuardSettings::new(RESOURCE));
     let mut silent = Watch { guard, out: Outbox::new(source(400, 100)) };
     silent.guard.observe(now(0.0), &Input::HistoryComplete(true), &mut silent.out);
-    silent.guard.observe(now(6.0), &Input::Deadline, &mut silent.out);
+    silent.pass(6.0);
     assert!(matches!(silent.guard.admits(now(6.0), ONE), Verdict::Failed(_)));
 }
 
