@@ -179,8 +179,21 @@ impl Hosted {
         self.restart_at.is_some_and(|at| at <= now)
     }
 
+    pub(crate) fn goes_by_what_is_kept(&self) -> bool {
+        self.service.as_ref().is_some_and(|service| service.goes_by_what_is_kept())
+    }
+
+    /// Whether it has crashed and is to start again: nobody wants what it still had to say.
+    pub(crate) fn has_crashed(&self) -> bool {
+        self.restart_at.is_some()
+    }
+
     fn crash(&mut self, now: Now, panic: &(dyn Any + Send)) -> Ran {
-        let text = panic_text(panic);
+        self.fail(now, panic_text(panic))
+    }
+
+    /// Ends this life of the service; the next begins by itself.
+    pub(crate) fn fail(&mut self, now: Now, text: String) -> Ran {
         self.service = None;
         self.deadline = None;
         self.outbox.forget();

@@ -21,6 +21,12 @@ pub trait Service: Send {
         false
     }
 
+    /// Whether it has to start again where the journal refuses something that it says. What it goes by is then what it has said
+    /// before, as [`Input::Recovered`] tells it: else others would miss a step that it believes it has made.
+    fn goes_by_what_is_kept(&self) -> bool {
+        false
+    }
+
     /// Takes one input. What it puts into the outbox is sent after it returns; it never gets its own messages back.
     fn handle(&mut self, now: Now, input: Input<'_>, out: &mut Outbox);
 

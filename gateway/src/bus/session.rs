@@ -6,10 +6,11 @@ use aldis_envelope::codec::native::encode;
 use aldis_envelope::{Change, Envelope, Keys, Priority, Source};
 use aldis_services::{Event, PublisherId};
 use bytes::Bytes;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
+use tokio::sync::Notify;
 use zenoh::bytes::ZBytes;
 use zenoh::key_expr::KeyExpr;
 use zenoh::liveliness::LivelinessToken;
@@ -20,6 +21,15 @@ use zenoh::{Session, Wait};
 
 /// How many keys of others are declared: with them Zenoh keeps a route for each. Ten thousand at once block for seconds.
 const KEYS_DECLARED_MAX: usize = 2_000;
+
+/// What is done where tokens are.
+const FOLLOW: &str = "follow the liveliness tokens";
+
+/// How long the answer to who is there may take.
+const TOKENS_WITHIN: Duration = Duration::from_secs(3);
+
+/// How often is asked who is there, where nobody seems to be.
+const TOKENS_ASKED_MAX: u32 = 3;
 
 /// How long closing the session may take.
 const CLOSE_WITHIN: Duration = Duration::from_secs(2);
@@ -50,6 +60,7 @@ pub(crate) struct Bus {
     subscribers: BTreeMap<String, Subscriber<()>>,
     tokens: BTreeMap<Source, LivelinessToken>,
     learned: Vec<KeyExpr<'static>>,
+    asked_for_tokens: u32,
     /// How often who is there has changed.
     changes: Arc<AtomicU64>,
     _alive: Option<Subscriber<()>>,
@@ -75,19 +86,15 @@ impl Bus {
             subscribers: BTreeMap::new(),
             tokens: BTreeMap::new(),
             learned: Vec::new(),
+            asked_for_tokens: 0,
             changes: Arc::default(),
             _alive: None,
         })
     }
 
-    /// Follows the liveliness tokens of the fleet, and says when those that are there now are all told.
-    pub(crate) fn follow_tokens(&mut self) -> Result<(), BusError> {
-        let doing = "follow the liveliness tokens";
-        let tell = |inbox: &Inbox, keys: &Keys, sample: &Sample| {
-            if let Ok(parsed) = keys.parse(sample.key_expr().as_str()) {
-                inbox.event(Event::Alive(parsed.source, sample.kind() == SampleKind::Put));
-            }
-        };
+    /// Follows the liveliness tokens of the fleet, and says when those that are there now are all told. A machine under load
+    /// may give no answer in time, which is not "nobody": then `again` is told, and has to call [`Self::ask_for_tokens`].
+    pub(crate) fn follow_tokens(&mut self, again: &Arc<Notify>) -> Result<(), BusError> {
         let (inbox, keys, changes) = (self.inbox.clone(), self.keys.clone(), self.changes.clone());
         let liveliness = self.session.liveliness();
         let subscriber = liveliness
@@ -95,23 +102,36 @@ impl Bus {
             .callback(move |sample| {
                 // Counted before it is told: who answers to the news is heard.
                 changes.fetch_add(1, Ordering::Relaxed);
-                tell(&inbox, &keys, &sample);
+                tell_alive(&inbox, &keys, &sample);
             })
             .wait()
-            .map_err(failed(doing))?;
-        let (keys, told) = (self.keys.clone(), Told(self.inbox.clone()));
-        liveliness
+            .map_err(failed(FOLLOW))?;
+        self._alive = Some(subscriber);
+        self.ask_for_tokens(again)
+    }
+
+    /// Asks for the tokens that are there now; what is told twice does no harm.
+    pub(crate) fn ask_for_tokens(&mut self, again: &Arc<Notify>) -> Result<(), BusError> {
+        self.asked_for_tokens += 1;
+        let keys = self.keys.clone();
+        let told = Told {
+            inbox: self.inbox.clone(),
+            again: (self.asked_for_tokens < TOKENS_ASKED_MAX).then(|| again.clone()),
+            others: AtomicBool::new(false),
+        };
+        let own: BTreeSet<_> = self.tokens.keys().copied().collect();
+        self.session
+            .liveliness()
             .get(self.keys.every_alive())
-            .timeout(Duration::from_secs(3))
+            .timeout(TOKENS_WITHIN)
             .callback(move |reply| {
-                if let Ok(sample) = reply.result() {
-                    tell(&told.0, &keys, sample);
+                let of = reply.result().ok().and_then(|sample| tell_alive(&told.inbox, &keys, sample));
+                if of.is_some_and(|of| !own.contains(&of)) {
+                    told.others.store(true, Ordering::Relaxed);
                 }
             })
             .wait()
-            .map_err(failed(doing))?;
-        self._alive = Some(subscriber);
-        Ok(())
+            .map_err(failed(FOLLOW))
     }
 
     /// Subscribes to these key expressions and to no others. New ones are declared before old ones go, so that nothing
@@ -248,13 +268,29 @@ pub(super) async fn off_the_loop<T: Send + 'static>(
     told.await
 }
 
-/// Says that all tokens are told when Zenoh has dropped the query's callback, which it does after the last reply.
-struct Told(Arc<Inbox>);
+/// Says that all tokens are told when Zenoh has dropped the query's callback, which it does after the last reply. Where none but
+/// the own came, it is asked again.
+struct Told {
+    inbox: Arc<Inbox>,
+    /// None: it has been asked often enough.
+    again: Option<Arc<Notify>>,
+    others: AtomicBool,
+}
 
 impl Drop for Told {
     fn drop(&mut self) {
-        self.0.event(Event::AliveKnown);
+        match &self.again {
+            Some(again) if !self.others.load(Ordering::Relaxed) => again.notify_one(),
+            _ => self.inbox.event(Event::AliveKnown),
+        }
     }
+}
+
+/// Tells of a token, and whose it is.
+fn tell_alive(inbox: &Inbox, keys: &Keys, sample: &Sample) -> Option<Source> {
+    let of = keys.parse(sample.key_expr().as_str()).ok()?.source;
+    inbox.event(Event::Alive(of, sample.kind() == SampleKind::Put));
+    Some(of)
 }
 
 fn take(inbox: &Inbox, sample: &Sample) {

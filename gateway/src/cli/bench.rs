@@ -3,6 +3,7 @@
 mod bus;
 mod child;
 mod configured;
+mod contention;
 mod join;
 mod journal;
 mod link;
@@ -43,6 +44,11 @@ enum What {
     Lmcp(lmcp::LmcpBench),
     /// UMAA's flow control and retained instances, beside raw Zenoh.
     Umaa(umaa::UmaaBench),
+    /// Contended allocations between processes that are killed: never two holders, and right again within the lease.
+    Contention(contention::Contention),
+    /// A process of `bench contention`.
+    #[command(hide = true)]
+    ContentionPeer(contention::ContentionPeer),
     /// The provider of `bench umaa`.
     #[command(hide = true)]
     UmaaPeer(umaa::UmaaPeer),
@@ -80,6 +86,8 @@ impl Bench {
             What::Joiner(joiner) => joiner.run(),
             What::Lmcp(bench) => bench.run(),
             What::Umaa(bench) => bench.run(),
+            What::Contention(bench) => bench.run(),
+            What::ContentionPeer(peer) => peer.run(),
             What::UmaaPeer(peer) => peer.run(),
             What::Journal(bench) => bench.run(),
             What::Plan(bench) => bench.run(),

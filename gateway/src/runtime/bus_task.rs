@@ -7,12 +7,14 @@ use aldis_envelope::Keys;
 use aldis_services::Event;
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::sync::watch;
+use tokio::sync::{Notify, watch};
 
 /// The first wait before a session is opened again, doubled each time.
 const RETRY_MIN: Duration = Duration::from_millis(200);
 /// The longest wait.
 const RETRY_MAX: Duration = Duration::from_secs(10);
+/// How soon is asked again who is there, where nobody seems to be.
+const ASK_AGAIN: Duration = Duration::from_millis(100);
 /// How often a session is asked whether it still lives: it dies by itself only when Zenoh gives up.
 const CHECK_EVERY: Duration = Duration::from_secs(1);
 
@@ -45,7 +47,8 @@ pub(super) async fn keep(
             opened = opening => opened,
             _ = exited.wait_for(|exited| *exited) => break,
         };
-        match opened.and_then(|bus| install(&core, bus)) {
+        let again = Arc::new(Notify::new());
+        match opened.and_then(|bus| install(&core, bus, &again)) {
             Ok(()) => wait = RETRY_MIN,
             Err(why) => {
                 core.lock().handle(&mut vec![Event::BusClosed(why.to_string())]);
@@ -63,6 +66,7 @@ pub(super) async fn keep(
             }
             _ = exited.wait_for(|exited| *exited) => {}
             () = until_closed(&core) => {}
+            () = ask_again(&core, &again) => {}
         }
         let bus = core.lock().set_bus(None);
         if let Some(bus) = bus {
@@ -73,13 +77,25 @@ pub(super) async fn keep(
 }
 
 /// The node has a session. What it declares goes out before the tokens are asked for, so that answers find their way.
-fn install(core: &Shared, bus: Bus) -> Result<(), BusError> {
+fn install(core: &Shared, bus: Bus, again: &Arc<Notify>) -> Result<(), BusError> {
     let mut core = core.lock();
     core.set_bus(Some(bus));
     core.handle(&mut vec![Event::BusOpened]);
     match core.bus() {
-        Some(bus) => bus.follow_tokens(),
+        Some(bus) => bus.follow_tokens(again),
         None => Ok(()),
+    }
+}
+
+/// Asks again who is there, as long as nobody seems to be. It ends with the session alone.
+async fn ask_again(core: &Shared, again: &Arc<Notify>) {
+    loop {
+        again.notified().await;
+        tokio::time::sleep(ASK_AGAIN).await;
+        let asked = core.lock().bus().map_or(Ok(()), |bus| bus.ask_for_tokens(again));
+        if let Err(why) = asked {
+            tracing::warn!("bus: {why}");
+        }
     }
 }
 

@@ -52,8 +52,9 @@ impl Shared {
 /// would never do; so Zenoh's thread, which must go on taking, does not put when much goes out.
 const QUIET: Duration = Duration::from_micros(20);
 
-/// So many puts of one turn go out on a callback: a command is answered with a handful of samples.
-const PUTS_ON_CALLBACK_MAX: u32 = 8;
+/// So many puts may go out on callbacks one after the other, one more for each [`QUIET`] that has passed: a command is answered
+/// with a handful of samples, and the next may follow at once.
+const PUTS_ON_CALLBACK_MAX: u32 = 16;
 
 /// On whose thread effects are carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,8 +72,8 @@ pub(crate) struct Core {
     deferred: VecDeque<Effect>,
     wake: Arc<Notify>,
     last_out: Option<Monotonic>,
-    /// How many puts a callback may still make in this turn.
-    puts_left: u32,
+    /// How many puts callbacks may still make, and until when that has been reckoned.
+    puts_left: (u32, Monotonic),
     clock: Clock,
     /// Kept for their memory.
     events: Vec<Event>,
@@ -107,7 +108,7 @@ impl Core {
             deferred: VecDeque::new(),
             wake: wake.clone(),
             last_out: None,
-            puts_left: 0,
+            puts_left: (PUTS_ON_CALLBACK_MAX, Monotonic::START),
             clock,
             events: Vec::new(),
             effects,
@@ -180,7 +181,7 @@ impl Core {
             let now = self.clock.now();
             let mut effects = std::mem::take(&mut self.effects);
             self.node.handle(now, events, &mut effects);
-            self.puts_left = if self.is_quiet(now.monotonic) { PUTS_ON_CALLBACK_MAX } else { 0 };
+            self.allow_puts(now.monotonic);
             for effect in effects.drain(..) {
                 self.carry_out(now.monotonic, effect, on, events);
             }
@@ -219,7 +220,7 @@ impl Core {
                 self.exited.send_replace(true);
             }
             bus if on == On::Loop || self.may_put_here(&bus) => {
-                self.puts_left = self.puts_left.saturating_sub(1);
+                self.puts_left.0 = self.puts_left.0.saturating_sub(1);
                 self.last_out = Some(now);
                 self.carry_out_on_bus(bus, events);
             }
@@ -230,6 +231,16 @@ impl Core {
         }
     }
 
+    /// What has passed without puts allows for more.
+    fn allow_puts(&mut self, now: Monotonic) {
+        let (left, since) = self.puts_left;
+        let more = (now - since).as_nanos() / QUIET.as_nanos();
+        if more > 0 {
+            let left = u128::from(left).saturating_add(more).min(PUTS_ON_CALLBACK_MAX.into()) as u32;
+            self.puts_left = (left, now);
+        }
+    }
+
     fn is_quiet(&self, now: Monotonic) -> bool {
         self.last_out.is_none_or(|last| now - last > QUIET)
     }
@@ -237,7 +248,7 @@ impl Core {
     /// Whether a callback may do this on the bus itself: it never declares, and puts only while little goes out.
     fn may_put_here(&self, effect: &Effect) -> bool {
         let puts = matches!(effect, Effect::Publish(..) | Effect::PublishOn(..));
-        puts && self.puts_left > 0 && self.deferred.is_empty()
+        puts && self.puts_left.0 > 0 && self.deferred.is_empty()
     }
 
     fn carry_out_on_bus(&mut self, effect: Effect, events: &mut Vec<Event>) {

@@ -110,7 +110,7 @@ impl Commands {
         match part.role {
             Role::Command => session.command(sample, retained, ledger),
             Role::Ack => session.ack(sample, retained, ledger),
-            Role::ExecutionStatus => session.execution_status(retained, ledger),
+            Role::ExecutionStatus => session.execution_status(sample, retained, ledger),
             Role::Status => return session.status(sample, retained, ledger),
         }
         None

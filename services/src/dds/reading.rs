@@ -1,17 +1,19 @@
 //! Follows the streams of other nodes: each sample once, in the order of its writer, with what is missing asked for.
 
+mod again;
+mod told;
+
 use super::Participant;
 use super::history::History;
 use super::qos::{Durability, Qos};
 use super::writers::name_of;
-use aldis_envelope::aldis::dds::{Ask, Confirm, History as Told, Retained, StreamName};
-use aldis_envelope::{
-    Address, EntityId, Envelope, Instance, Label, Message, Monotonic, Prefix, Priority, Stamp,
-};
-use bytes::Bytes;
+use again::Former;
+use aldis_envelope::aldis::dds::{Ask, Confirm, History as Told, StreamName};
+use aldis_envelope::{Address, EntityId, Envelope, Label, Monotonic, Prefix};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
+use told::envelope;
 
 /// How many streams are followed. What is beyond is handed on as it comes.
 const STREAMS_MAX: usize = 65_536;
@@ -21,8 +23,13 @@ const HELD_MAX: usize = 4_096;
 const SEQUENCE_MAX: u64 = 1 << 62;
 /// How long an answer is waited for before it is asked for again.
 const ASK_FIRST: Duration = Duration::from_millis(250);
-/// How often is asked in vain, twice as long each time, before what is missing is given up: 16 s in all.
-const ASKS_MAX: u32 = 6;
+/// The longest wait for an answer: it is twice as long each time.
+const ASK_LAST: Duration = Duration::from_secs(4);
+/// How often is asked in vain before what is missing is given up: 64 s in all. A machine that stands still for half a minute
+/// loses nothing.
+const ASKS_MAX: u32 = 20;
+/// How long what was handed over waits to be confirmed together with what follows, where its writer has not asked for it.
+const CONFIRM_WITHIN: Duration = Duration::from_millis(10);
 
 /// What comes of an input.
 #[derive(Debug, Default)]
@@ -57,7 +64,11 @@ struct Stream {
     held: BTreeMap<u64, Envelope>,
     asked: Option<Asked>,
     history: History,
+    /// What was handed over of it in the former life of its writer's node.
+    former: Former,
     confirmed: u64,
+    /// Up to here its writer has asked for.
+    asked_for: u64,
 }
 
 /// The streams that a node reads.
@@ -65,6 +76,8 @@ struct Stream {
 pub struct Reading {
     streams: BTreeMap<Key, Stream>,
     unconfirmed: BTreeSet<Key>,
+    /// When they are confirmed.
+    confirm_at: Option<Monotonic>,
     /// Streams that wait for an answer.
     asking: BTreeSet<Key>,
 }
@@ -89,7 +102,7 @@ impl Reading {
         if sequence < stream.next || stream.held.contains_key(&sequence) {
             step.duplicates += 1;
             // Its confirmation may have been lost.
-            self.unconfirmed.insert(key);
+            self.confirm(key, now);
             return;
         }
         stream.end = stream.end.max(sequence);
@@ -118,7 +131,8 @@ impl Reading {
                 continue;
             };
             stream.end = stream.end.max(*end);
-            self.unconfirmed.insert(key.clone());
+            stream.asked_for = stream.asked_for.max(*end);
+            self.confirm(key.clone(), now);
             self.go_on(now, &key, step);
         }
     }
@@ -172,7 +186,8 @@ impl Reading {
             }
             Some(stream) => {
                 stream.give_up(step);
-                *stream = Stream::new(participant, qos, heard);
+                let former = Former::of(&stream.history);
+                *stream = Stream { former, ..Stream::new(participant, qos, heard) };
                 self.asking.remove(&key);
             }
             None if full => return None,
@@ -186,12 +201,12 @@ impl Reading {
     fn go_on(&mut self, now: Monotonic, key: &Key, step: &mut Step) {
         let Some(stream) = self.streams.get_mut(key) else { return };
         stream.hand_over_held(step);
-        if stream.next - 1 > stream.confirmed {
-            self.unconfirmed.insert(key.clone());
-        }
+        let is_asked_for = stream.asked_for > stream.confirmed;
+        let is_news = stream.next - 1 > stream.confirmed;
         match stream.missing() {
             None => {
                 stream.asked = None;
+                stream.former.forget();
                 self.asking.remove(key);
             }
             Some(upto) if stream.asked.as_ref().is_none_or(|asked| asked.upto < stream.next) => {
@@ -201,6 +216,15 @@ impl Reading {
             }
             Some(_) => {}
         }
+        if is_news {
+            self.confirm(key.clone(), if is_asked_for { now } else { now + CONFIRM_WITHIN });
+        }
+    }
+
+    /// A stream is to be confirmed by then.
+    fn confirm(&mut self, key: Key, by: Monotonic) {
+        self.unconfirmed.insert(key);
+        self.confirm_at = Some(self.confirm_at.map_or(by, |at| at.min(by)));
     }
 
     /// Asks again where no answer came, and gives up what has been asked for too often. While the own session is down
@@ -222,7 +246,7 @@ impl Reading {
                 continue;
             }
             asked.upto = upto;
-            asked.again = now + ASK_FIRST * 2_u32.pow(asked.times);
+            asked.again = now + (ASK_FIRST * 2_u32.pow(asked.times.min(10))).min(ASK_LAST);
             step.ask.push(stream.ask(&key.1, upto));
         }
     }
@@ -232,18 +256,24 @@ impl Reading {
         asked.is_some_and(|asked| asked.again <= now)
     }
 
-    /// When something is to be asked again.
+    /// When something is to be asked again, or confirmed.
     pub fn next_deadline(&self) -> Option<Monotonic> {
         if self.asking.is_empty() {
-            return None;
+            return self.confirm_at;
         }
         let streams = self.asking.iter().filter_map(|key| self.streams.get(key));
-        streams.filter_map(|stream| stream.asked.as_ref()).map(|asked| asked.again).min()
+        let asked = streams.filter_map(|stream| stream.asked.as_ref()).map(|asked| asked.again);
+        asked.chain(self.confirm_at).min()
     }
 
-    /// How far each stream has been handed over, where that is news to its writer.
-    pub fn confirmations(&mut self) -> Vec<(Participant, Confirm)> {
-        if self.unconfirmed.is_empty() {
+    /// How far each stream has been handed over, where that is news to its writer: at once where it has asked, else a little
+    /// later and many together. Nothing while the session is down: writers ask again when it is up.
+    pub fn confirmations(&mut self, now: Monotonic, bus_is_open: bool) -> Vec<(Participant, Confirm)> {
+        if !self.confirm_at.is_some_and(|at| at <= now || !bus_is_open) {
+            return Vec::new();
+        }
+        self.confirm_at = None;
+        if !bus_is_open {
             return Vec::new();
         }
         let mut by_writer: BTreeMap<Participant, Vec<(StreamName, u64)>> = BTreeMap::new();
@@ -288,7 +318,9 @@ impl Stream {
             held: BTreeMap::new(),
             asked: None,
             history: History::new(qos),
+            former: Former::default(),
             confirmed: 0,
+            asked_for: 0,
         }
     }
 
@@ -296,7 +328,11 @@ impl Stream {
         self.next = envelope.stamp.sequence + 1;
         self.history.add(envelope.clone());
         self.history.settle(envelope.stamp.sequence);
-        step.deliver.push(envelope);
+        if self.former.has(&envelope) {
+            step.duplicates += 1;
+        } else {
+            step.deliver.push(envelope);
+        }
     }
 
     fn hand_over_held(&mut self, step: &mut Step) {
@@ -349,21 +385,4 @@ impl Stream {
         self.label = Some(label.clone());
         label
     }
-}
-
-fn envelope(from: Participant, label: &Arc<Label>, sample: Retained) -> Envelope {
-    let Retained { sequence, source_time, change, hash, key, content } = sample;
-    let instance = hash.map(|hash| Arc::new(Instance { hash, key: key.map(Bytes::from) }));
-    let stamp = Stamp {
-        node: from.node,
-        boot: from.boot,
-        sequence,
-        source_time,
-        lifespan_left_ms: None,
-        priority: Priority::Data,
-        skipped: 0,
-        via: Vec::new(),
-    };
-    let message = Message { change, instance, ..Message::new(label.clone(), content.into()) };
-    Envelope { message, stamp }
 }

@@ -164,7 +164,7 @@ impl Pair {
         for (_, ask) in step.ask {
             self.send(true, || Word::Ask(ask.clone()));
         }
-        for (_, confirm) in self.reading.confirmations() {
+        for (_, confirm) in self.reading.confirmations(self.now, true) {
             self.send(true, || Word::Confirm(confirm.clone()));
         }
     }
@@ -271,7 +271,7 @@ fn what_claims_to_come_from_far_ahead_is_given_up_within_a_bound() {
     pair.reading.sample(pair.now, pair.qos, &sample, &mut step);
     assert!(step.deliver.is_empty());
     pair.finish(step);
-    pair.run_for(Duration::from_secs(60));
+    pair.run_for(Duration::from_secs(80));
     assert_eq!(pair.got.len(), 1);
     assert_eq!(pair.lost, (1 << 40) - 1);
     let mut beyond = sample.clone();
@@ -279,4 +279,57 @@ fn what_claims_to_come_from_far_ahead_is_given_up_within_a_bound() {
     let mut step = Step::default();
     pair.reading.sample(pair.now, pair.qos, &beyond, &mut step);
     assert_eq!(step.deliver.len(), 1, "handed on, not followed");
+}
+
+/// What a reader makes of samples, as the numbers in their contents.
+fn hear(reading: &mut Reading, now: Monotonic, samples: &[Envelope]) -> Vec<u64> {
+    let mut step = Step::default();
+    samples.iter().for_each(|sample| reading.sample(now, qos(Keep::All), sample, &mut step));
+    let number = |envelope: &Envelope| u64::from_be_bytes(envelope.message.content[..].try_into().unwrap());
+    step.deliver.iter().map(number).collect()
+}
+
+#[test]
+fn one_confirmation_speaks_for_many_samples_unless_their_writer_asks() {
+    let mut pair = Pair::new(1, qos(Keep::All), (0, 0));
+    let samples: Vec<_> = (0..4).map(|id| pair.write(id, Change::Put)).collect();
+    let (mut reading, now) = (Reading::default(), pair.now);
+    let upto = |confirms: Vec<(Participant, Confirm)>| {
+        confirms.into_iter().flat_map(|(_, confirm)| confirm.upto).map(|(_, upto)| upto).collect::<Vec<_>>()
+    };
+    hear(&mut reading, now, &samples[..3]);
+    assert_eq!(upto(reading.confirmations(now, true)), []);
+    let due = reading.next_deadline().unwrap();
+    assert_eq!(upto(reading.confirmations(due, true)), [3]);
+    let ends = [(writers::name_of(&samples[3]).unwrap(), 4)];
+    let mut step = Step::default();
+    reading.ends(due, participant(4), &ends, |_: &Address| Some(qos(Keep::All)), &mut step);
+    assert_eq!(upto(reading.confirmations(due, true)), [3], "it says what it has");
+    hear(&mut reading, due, &samples[3..]);
+    assert_eq!(upto(reading.confirmations(due, true)), [4], "what is waited for is said at once");
+    assert_eq!(reading.next_deadline(), None);
+}
+
+#[test]
+fn who_stayed_hears_of_each_instance_that_is_there_the_last_sample_once_more() {
+    let mut pair = Pair::new(1, qos(Keep::All), (0, 0));
+    let changes =
+        [(1, Change::Put), (1, Change::Put), (2, Change::Put), (2, Change::Dispose), (1, Change::Put)];
+    let written: Vec<_> = changes.into_iter().map(|(id, change)| pair.write(id, change)).collect();
+    let mut reading = Reading::default();
+    assert_eq!(hear(&mut reading, pair.now, &written[..4]), [1, 2, 3, 4]);
+    // The next life has both samples of the first instance and the end of the second, and says something new then.
+    let again = [&written[0], &written[1], &written[3], &written[4]].into_iter().zip(1..);
+    let again: Vec<_> = again
+        .map(|(sample, sequence)| {
+            let mut sample = sample.clone();
+            (sample.stamp.boot, sample.stamp.sequence) = (BootId(2), sequence);
+            sample
+        })
+        .collect();
+    let (later, ends) =
+        (Participant { boot: BootId(2), ..participant(4) }, [(writers::name_of(&again[0]).unwrap(), 4)]);
+    let mut step = Step::default();
+    reading.ends(pair.now, later, &ends, |_: &Address| Some(qos(Keep::All)), &mut step);
+    assert_eq!(hear(&mut reading, pair.now, &again), [2, 5]);
 }

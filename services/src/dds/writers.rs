@@ -152,6 +152,16 @@ impl Writers {
         None
     }
 
+    /// Where the stream of a sample stands, for the readers that are waited for: what they are asked to confirm at once.
+    pub fn awaited(&self, sample: &Envelope) -> Vec<(Participant, Streams)> {
+        let Some(name) = name_of(sample) else { return Vec::new() };
+        let sequence = sample.stamp.sequence;
+        let waiting = self.waiting.iter().filter(|w| w.stream == name && w.sequence == sequence);
+        let missing: BTreeSet<_> = waiting.flat_map(|waiting| waiting.missing.iter().copied()).collect();
+        let ends = vec![(name, sequence)];
+        missing.into_iter().map(|p| (p, Streams { to: p.boot, answers: None, ends: ends.clone() })).collect()
+    }
+
     /// A participant announces its readers. What its streams hold is the answer. Reliable readers have one life at a time, so
     /// that a later one ends the former; the command line may run several programs as one entity.
     pub fn announced(

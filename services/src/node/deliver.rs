@@ -67,10 +67,12 @@ impl Node {
             }
         }
         self.deliver_here(now, origin, place, &envelope, effects);
+        let mut awaited = None;
         if let Some((number, within)) = confirm {
             let source = envelope.message.label.source();
             let deadline = now.monotonic + within;
             let at_once = self.sharing.writers.confirm(source, number, &envelope, deadline);
+            awaited = at_once.is_none().then(|| envelope.clone());
             self.tell_confirmed(now, at_once.into_iter().collect(), effects);
         }
         let elsewhere = publish && !self.is_for_a_service_here(&envelope.message.label.address);
@@ -79,6 +81,9 @@ impl Node {
         }
         if self.bus_is_open {
             self.publish(place, envelope, effects);
+            if let Some(sample) = awaited {
+                self.ask_for_confirmation(now, &sample, effects);
+            }
         } else if qos.is_none() {
             self.outbound.held_back(outgoing, skipped);
             self.counters.held_back_offline += 1;

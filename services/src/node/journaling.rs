@@ -257,7 +257,9 @@ impl Node {
         if let Err(not_kept) = kept {
             let (held, why) = *not_kept;
             let is_of_journal = !matches!(why, Refused::Batch(_));
+            let origin = held.work.origin;
             self.not_kept(now, held, &why, effects);
+            self.start_anew(now, origin, &why, effects);
             if is_of_journal {
                 self.journal_fails(now, &why, effects);
             }
@@ -283,7 +285,9 @@ impl Node {
 
     fn refused(&mut self, now: Now, from: u64, to: u64, why: &Refused, effects: &mut Vec<Effect>) {
         for held in self.keeping.refused(from, to) {
+            let origin = held.work.origin;
             self.not_kept(now, held, why, effects);
+            self.start_anew(now, origin, why, effects);
         }
         self.begun(now, to, effects);
         self.hand_on_kept(now, effects);
@@ -299,6 +303,18 @@ impl Node {
         if let (Some((number, _)), Origin::Service(place)) = (held.work.confirm, held.work.origin) {
             let outcome = Err(Unconfirmed::NotKept(why.to_string()));
             self.run(now, place, Input::Confirmed(number, outcome), effects);
+        }
+    }
+
+    /// A service whose word is not kept, and that goes by what it has said, begins a new life with what is kept. What it said
+    /// behind goes nowhere either.
+    fn start_anew(&mut self, now: Now, origin: Origin, why: &Refused, effects: &mut Vec<Effect>) {
+        let Origin::Service(place) = origin else { return };
+        if self.services[place].goes_by_what_is_kept() {
+            self.keeping.drop_all_of(origin);
+            self.work.retain(|work| work.origin != origin);
+            let ran = self.services[place].fail(now, format!("what it says is not kept: {why}"));
+            self.after(now, place, ran, effects);
         }
     }
 

@@ -221,6 +221,23 @@ impl Keeping {
         Some(held)
     }
 
+    /// Nothing that waits of an origin is handed on, nor kept.
+    pub(super) fn drop_all_of(&mut self, origin: Origin) {
+        self.origins.remove(&origin);
+        let is_its = |held: &Held| held.work.origin == origin;
+        let (dropped, left): (VecDeque<_>, _) =
+            std::mem::take(&mut self.waiting).into_iter().partition(is_its);
+        self.waiting = left;
+        self.forgotten.extend(dropped.iter().filter_map(Held::record));
+    }
+
+    /// Nobody is told any more when what waits of an origin is confirmed.
+    pub(super) fn forget_confirmations(&mut self, origin: Origin) {
+        for held in self.waiting.iter_mut().filter(|held| held.work.origin == origin) {
+            held.work.confirm = None;
+        }
+    }
+
     fn leaves(&mut self, origin: Origin) {
         if let Some(count) = self.origins.get_mut(&origin) {
             *count -= 1;

@@ -14,8 +14,11 @@ fn work(place: usize, message: Message) -> Work {
 
 impl Node {
     pub(super) fn start_service(&mut self, now: Now, place: usize, effects: &mut Vec<Effect>) {
-        let ran = self.services[place].start(now);
         let source = self.services[place].spec.source;
+        // Its numbers begin anew: what a former life waited for must not be told to this one.
+        self.sharing.writers.forget_confirmations(source);
+        self.keeping.forget_confirmations(Origin::Service(place));
+        let ran = self.services[place].start(now);
         let running = self.services[place].is_running();
         self.awake.push_back(place);
         self.links.services_changed();
@@ -42,7 +45,7 @@ impl Node {
         }
     }
 
-    fn after(&mut self, now: Now, place: usize, ran: Ran, effects: &mut Vec<Effect>) {
+    pub(super) fn after(&mut self, now: Now, place: usize, ran: Ran, effects: &mut Vec<Effect>) {
         let Ran::Crashed(text) = ran else { return };
         let source = self.services[place].spec.source;
         self.counters.crashes += 1;
@@ -100,7 +103,10 @@ impl Node {
 
     fn take_message(&mut self, now: Now, source: Source, work: Work, effects: &mut Vec<Effect>) {
         let claimed = work.message.label.source();
-        if claimed != source {
+        let has_crashed = matches!(work.origin, Origin::Service(place) if self.services[place].has_crashed());
+        if has_crashed {
+            // What it still had to say goes with its life.
+        } else if claimed != source {
             self.counters.refused_sources += 1;
             let text = format!("service {source} tried to send as {claimed}: refused");
             self.say(now, Level::Error, "refused source", text, effects);

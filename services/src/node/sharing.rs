@@ -281,6 +281,13 @@ impl Node {
         }
     }
 
+    /// A service waits until all have a sample: its readers are asked to say so at once.
+    pub(super) fn ask_for_confirmation(&mut self, now: Now, sample: &Envelope, effects: &mut Vec<Effect>) {
+        for (reader, ends) in self.sharing.writers.awaited(sample) {
+            self.tell(now, Space::State, Some(reader.node), dds::STREAMS, &ends, effects);
+        }
+    }
+
     pub(super) fn tell_confirmed(&mut self, now: Now, confirmed: Vec<Confirmed>, effects: &mut Vec<Effect>) {
         for Confirmed { source, number, outcome } in confirmed {
             if let Some(place) = self.services.iter().position(|hosted| hosted.spec.source == source) {
@@ -307,10 +314,8 @@ impl Node {
 
     /// Confirms what was handed over, and tells services that have all there is.
     pub(super) fn finish_sharing(&mut self, now: Now, effects: &mut Vec<Effect>) {
-        if self.bus_is_open {
-            for (writer, confirm) in self.sharing.reading.confirmations() {
-                self.tell(now, Space::Ack, Some(writer.node), dds::CONFIRM, &confirm, effects);
-            }
+        for (writer, confirm) in self.sharing.reading.confirmations(now.monotonic, self.bus_is_open) {
+            self.tell(now, Space::Ack, Some(writer.node), dds::CONFIRM, &confirm, effects);
         }
         let starting = std::mem::take(&mut self.sharing.starting);
         for mut service in starting {

@@ -16,7 +16,6 @@ mod control;
 mod fleet;
 pub(crate) mod flow;
 mod illegal;
-mod keeper;
 mod makers;
 mod mirror;
 mod outside;
@@ -24,10 +23,12 @@ mod saboteur;
 pub(crate) mod scripted;
 mod tally;
 mod tamper;
+mod tampered;
 #[cfg(test)]
 mod tests;
 mod violation;
 mod watch;
+mod wrote;
 
 pub use campaign::{Campaign, Recorded};
 pub use fleet::{Planted, UmaaFleet, options};

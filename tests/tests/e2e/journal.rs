@@ -77,10 +77,9 @@ fn an_arbiter_that_is_killed_keeps_who_is_in_control_and_the_lists_that_were_set
         let holding = holding.join().unwrap();
         let states: Vec<_> =
             holding.json().iter().filter_map(|line| line["state"].as_str().map(str::to_owned)).collect();
-        // Who stayed hears what is retained once more; the command itself went on.
-        let once = ["ISSUED", "COMMANDED", "EXECUTING"];
-        assert_eq!(states[..3], once, "{holding:?}");
-        assert!(states.len() <= 6 && states.ends_with(&once.map(String::from)), "{holding:?}");
+        // Who stayed hears once more where the command stands, at the most; the command itself went on.
+        assert_eq!(states[..3], ["ISSUED", "COMMANDED", "EXECUTING"], "{holding:?}");
+        assert!(states.len() <= 4 && states.last().is_some_and(|last| last == "EXECUTING"), "{holding:?}");
         assert_eq!(holding.json().last().unwrap()["outcome"], "CANCELED", "{holding:?}");
         until("nobody holds it", || state()["holder"].is_null().then_some(()));
     });

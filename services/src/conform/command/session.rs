@@ -32,6 +32,7 @@ pub(super) struct Session {
     last_status: Option<Sample>,
     /// The command as it was acknowledged last: it may come later than that.
     last_ack: Option<Sample>,
+    last_execution_status: Option<Sample>,
     acknowledged: bool,
     /// Who spoke about the command has unregistered, or contact is lost: its next life may go on, or begin anew.
     provider_gone: bool,
@@ -57,6 +58,7 @@ impl Session {
             ended: None,
             last_status: None,
             last_ack: None,
+            last_execution_status: None,
             acknowledged: false,
             provider_gone: false,
             may_return: false,
@@ -184,8 +186,12 @@ impl Session {
     }
 
     /// An execution status.
-    pub(super) fn execution_status(&mut self, retained: bool, ledger: &mut Ledger) {
+    pub(super) fn execution_status(&mut self, sample: &Sample, retained: bool, ledger: &mut Ledger) {
         self.execution_status_there = true;
+        // The same sample again, after a restart of who carries it, says nothing of now.
+        if self.last_execution_status.replace(sample.clone()).as_ref() == Some(sample) {
+            return;
+        }
         self.correlate(retained, "an execution status", ledger);
         if retained {
             return;
@@ -233,7 +239,13 @@ impl Session {
         self.ended = is_terminal(&to).then_some(ledger.now());
         self.after(&to, &reason, retained, ledger);
         let (family, session, provider) = self.id.clone();
-        Some(Step { family, provider, session, command: self.command.clone(), to, reason, retained })
+        Some(Step { family, provider, session, command: self.commanded().cloned(), to, reason, retained })
+    }
+
+    /// The command that a status is about: an update that its provider has not acknowledged is on its way to it.
+    fn commanded(&self) -> Option<&Sample> {
+        let acknowledged = self.last_ack.as_ref().filter(|ack| self.before.contains(ack));
+        acknowledged.or(self.command.as_ref())
     }
 
     fn transition(&self, to: &str, reason: &str, ledger: &mut Ledger) {

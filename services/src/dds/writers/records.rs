@@ -11,6 +11,11 @@ impl Writers {
         self.streams.iter().filter(move |(name, _)| name.source == source).map(|(_, stream)| &stream.history)
     }
 
+    /// A source begins a new life: it waits for nothing that its former one has asked for.
+    pub fn forget_confirmations(&mut self, source: Source) {
+        self.waiting.retain(|waiting| waiting.source != source);
+    }
+
     /// The journal holds a sample that was just written under a number.
     pub fn recorded(&mut self, sample: &Envelope, record: u64) {
         match name_of(sample).and_then(|name| self.streams.get_mut(&name)) {

@@ -86,3 +86,18 @@ fn much_to_forget_goes_alone_and_in_its_order() {
     assert_eq!(keeping.forgotten.len(), 5);
     assert_eq!(keeping.take_batches(true)[0].1.operations().len(), 5);
 }
+
+#[test]
+fn what_is_dropped_is_neither_handed_on_nor_kept() {
+    let mut keeping = Keeping::default();
+    for service in [1, 2, 1] {
+        keeping.keep(held(service), value(10)).map_err(|_| ()).unwrap();
+    }
+    keeping.hold(held(1));
+    assert_eq!(keeping.take_batches(false)[0].0, 1);
+    keeping.drop_all_of(Origin::Service(1));
+    assert_eq!(keeping.forgotten, [1, 3]);
+    keeping.written(1);
+    assert!(!keeping.holds(Origin::Service(1)));
+    assert_eq!(origins(&mut keeping), [Origin::Service(2)]);
+}

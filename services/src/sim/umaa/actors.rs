@@ -184,6 +184,10 @@ impl<C: Command, M: Maker<C>> Service for User<C, M> {
         self.consumer.subscriptions()
     }
 
+    fn goes_by_what_is_kept(&self) -> bool {
+        true
+    }
+
     fn handle(&mut self, now: Now, input: Input<'_>, out: &mut Outbox) {
         let told = self.consumer.handle(now, &input, out);
         told.iter().for_each(|told| self.hear(told));
@@ -272,6 +276,10 @@ pub(super) fn any_course(random: &mut fastrand::Rng) -> VectorCommand {
 impl Service for Captain {
     fn subscriptions(&self) -> Vec<Prefix> {
         self.consumer.subscriptions()
+    }
+
+    fn goes_by_what_is_kept(&self) -> bool {
+        true
     }
 
     fn handle(&mut self, now: Now, input: Input<'_>, out: &mut Outbox) {

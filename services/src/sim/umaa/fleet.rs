@@ -6,15 +6,16 @@ use super::arrangement::{AUTOPILOT, Arrangement};
 use super::commands::{RudderCommand, VectorCommand, steer};
 use super::control::Control;
 use super::flow::Flow;
-use super::keeper::{Keeper, Store};
 use super::makers::{Allocations, Courses, Lists, Rudders};
-use super::mirror::{Board, Mirror, Mirrors};
+use super::mirror::{Board, Mirror, Mirrors, Told};
 use super::outside::{Calm, Outside};
 use super::saboteur::Saboteur;
 use super::scripted::{Helm, Scripted};
 use super::tally::Tally;
 use super::tamper::{Forgetful, Honest, Tamper, Unconfirmed};
+use super::tampered::Tampered;
 use super::watch::{Findings, Watch};
+use crate::dds::{Durability, Keep, Qos, TopicRule};
 use crate::node::NodeConfig;
 use crate::registry;
 use crate::service::{Service, ServiceSpec};
@@ -143,6 +144,18 @@ impl UmaaFleet {
     }
 }
 
+/// What the services say outlives their processes, on the journals of their nodes.
+fn persistent() -> Vec<TopicRule> {
+    let kept = Qos { durability: Durability::Persistent, keep: Keep::ByPattern, samples_max: 200_000 };
+    let told = Qos { durability: Durability::Volatile, ..kept };
+    let rules = [("UMAA::SO::LogReport", told), ("UMAA::", kept)];
+    let rule = |(prefix, qos): (&str, Qos)| {
+        let prefix = Prefix::new(prefix).ok()?;
+        Some(TopicRule { prefix, qos: Some(qos) })
+    };
+    rules.into_iter().filter_map(rule).collect()
+}
+
 /// Makes what stands in the way of a service.
 type MakeTamper = Box<dyn Fn() -> Box<dyn Tamper> + Send + Sync>;
 
@@ -265,33 +278,36 @@ impl Workload for UmaaFleet {
         services.extend(providers(arrangement, self.guard_settings()));
         services.extend(captains(arrangement, &stage, random));
         services.extend(consumers(arrangement, &stage));
-        let kept: Vec<_> = services
+        let tampered: Vec<_> = services
             .into_iter()
             .map(|(source, make)| {
-                let (store, lives, seed) = (Store::default(), AtomicU64::new(0), random.u64(..));
+                let (lives, seed) = (AtomicU64::new(0), random.u64(..));
                 let (facts, tamper) = (facts.clone(), self.tamper_of(source, arrangement));
                 let factory = Arc::new(move || -> Box<dyn Service> {
                     let inner = make(seed.wrapping_add(lives.fetch_add(1, Ordering::Relaxed)));
-                    Box::new(Keeper::new(source, inner, store.clone(), facts.clone(), tamper()))
+                    Box::new(Tampered::new(source, inner, tamper(), facts.clone()))
                 });
                 ServiceSpec { source, name: "umaa".into(), factory }
             })
             .collect();
         let node = |&entity| {
-            let mut services = registry::built_in(entity, &arrangement.guids, 5 * SECOND);
+            let mut services = Vec::new();
             if let Ok(service) = ServiceId::new(140) {
-                let (board, facts) = (self.board.clone(), facts.clone());
-                let factory =
-                    Arc::new(move || Box::new(Mirror::new(entity, board.clone(), facts.clone())) as _);
+                let (board, facts, told) = (self.board.clone(), facts.clone(), Told::default());
+                let factory = Arc::new(move || {
+                    Box::new(Mirror::new(entity, board.clone(), facts.clone(), told.clone())) as _
+                });
+                // The first on its node: it sees what is written before anybody answers it.
                 let source = Source::new(entity, service);
                 services.push(ServiceSpec { source, name: "mirror".into(), factory });
             }
-            services.extend(kept.iter().filter(|spec| spec.source.entity == entity).cloned());
+            services.extend(registry::built_in(entity, &arrangement.guids, 5 * SECOND));
+            services.extend(tampered.iter().filter(|spec| spec.source.entity == entity).cloned());
             NodeConfig {
                 fleet: arrangement.fleet.clone(),
                 entities: vec![entity],
                 boot: BootId(0),
-                topics: Vec::new(),
+                topics: persistent(),
                 reliable: true,
                 operators: arrangement.entities.clone(),
                 allow: Vec::new(),

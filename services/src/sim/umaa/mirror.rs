@@ -1,11 +1,11 @@
 //! Every node has a reader of everything: what it reads comes in order and once, and after all faults have ended it holds what
 //! every other one holds.
 
-use super::keeper::Wrote;
+use super::wrote::Wrote;
 use crate::service::{Input, Outbox, Service};
 use crate::sim::observe::{Checker, Fact, Facts, Observation, Seen};
-use aldis_envelope::{Change, EntityId, Envelope, KeyHash, Monotonic, Now, Prefix, Source};
-use std::collections::BTreeMap;
+use aldis_envelope::{Change, EntityId, Envelope, KeyHash, Monotonic, Now, Prefix, ServiceId, Source, Wall};
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -51,11 +51,41 @@ impl Board {
     }
 }
 
-/// The reader of a node.
+/// What has been told of the writers of a node, over its lives.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Told(Arc<Mutex<BTreeMap<InstanceId, InstanceTold>>>);
+
+#[derive(Debug, Default)]
+struct InstanceTold {
+    samples: BTreeSet<Sample>,
+    last: Option<Sample>,
+}
+
+/// A sample of an instance: when its source sent it, and a hash of what it says and does.
+type Sample = (Wall, u32);
+
+impl Told {
+    /// Whether a sample is to be told: a new one, or the last one again, which a new life retains.
+    fn is_to_be_told(&self, id: &InstanceId, envelope: &Envelope) -> bool {
+        let Envelope { message, stamp } = envelope;
+        let what = (message.change == Change::Put).then(|| crc32fast::hash(&message.content));
+        let sample = (stamp.source_time, what.unwrap_or(message.change as u32));
+        let mut told = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let told = told.entry(id.clone()).or_default();
+        let is_new = told.samples.insert(sample);
+        if is_new {
+            told.last = Some(sample);
+        }
+        is_new || told.last == Some(sample)
+    }
+}
+
+/// The reader of a node. What services of the node itself write it hears as soon as that is on disk, and tells.
 pub(super) struct Mirror {
     node: EntityId,
     board: Board,
     facts: Facts,
+    told: Told,
     /// The last boot and sequence of each stream.
     streams: BTreeMap<(Source, String), (u64, u64)>,
     /// The last boot of each writer.
@@ -63,12 +93,16 @@ pub(super) struct Mirror {
 }
 
 impl Mirror {
-    pub(super) fn new(node: EntityId, board: Board, facts: Facts) -> Self {
-        Self { node, board, facts, streams: BTreeMap::new(), boots: BTreeMap::new() }
+    pub(super) fn new(node: EntityId, board: Board, facts: Facts, told: Told) -> Self {
+        Self { node, board, facts, told, streams: BTreeMap::new(), boots: BTreeMap::new() }
     }
 
     fn read(&mut self, envelope: &Envelope) {
         let Some(id) = id_of(envelope) else { return };
+        let is_kept = id.2.service >= ServiceId::ALLOCATION;
+        if id.2.entity == self.node && is_kept && self.told.is_to_be_told(&id, envelope) {
+            self.facts.tell(Wrote(envelope.clone()));
+        }
         let now = (envelope.stamp.boot.0, envelope.stamp.sequence);
         if let Some(before) = self.streams.insert((id.2, id.0.clone()), now)
             && before >= now

@@ -3,8 +3,8 @@
 use super::actors::LastWord;
 use super::control::Control;
 use super::flow::Flow;
-use super::keeper::Wrote;
 use super::tally::Tally;
+use super::wrote::Wrote;
 use crate::sim::observe::{Checker, Observation, Seen};
 use crate::sim::world::NodeHandle;
 use aldis_envelope::umaa::{self, ResourceAllocationReport, Topic};

@@ -17,7 +17,7 @@ use std::time::Duration;
 pub(crate) type Said = Arc<Mutex<Vec<String>>>;
 
 /// What may go wrong with a command, by name: all that figure 5 has a reason for.
-pub(crate) const TROUBLES: [&str; 12] = [
+pub(crate) const TROUBLES: [&str; 14] = [
     "",
     "",
     "",
@@ -29,6 +29,8 @@ pub(crate) const TROUBLES: [&str; 12] = [
     "dead",
     "not to be stopped",
     "not to be recovered",
+    "slow to validate, not to be recovered",
+    "slow to start, not to be recovered",
     "interrupted at validation",
 ];
 
@@ -71,7 +73,7 @@ impl<C: Script> Executor<C> for Scripted<C> {
             _ if !commanded.command.is_valid() => failed(FailureKind::Invalid, "it is outside its range"),
             "dead at validation" => failed(FailureKind::Resource, "no rudder answers"),
             "interrupted at validation" => failed(FailureKind::Interrupted, "somebody has the wheel"),
-            "slow to validate" => Verdict::Later,
+            trouble if trouble.starts_with("slow to validate") => Verdict::Later,
             _ => Verdict::Valid,
         }
     }
@@ -85,7 +87,7 @@ impl<C: Script> Executor<C> for Scripted<C> {
         self.say(|| format!("start {}", commanded.command.text()));
         match commanded.command.trouble() {
             "rejected" => Progress::Failed(Failure::new(FailureKind::Rejected, "not in this sea")),
-            "slow to start" => Progress::Waiting,
+            trouble if trouble.starts_with("slow to start") => Progress::Waiting,
             "done at once" => Progress::Completed,
             _ => {
                 let ends = Self::ends(now, commanded.command);
@@ -103,7 +105,7 @@ impl<C: Script> Executor<C> for Scripted<C> {
     ) -> Progress<C::ExecutionStatus> {
         let ends = match self.running.get(&commanded.id) {
             Some(&ends) => ends,
-            None if commanded.command.trouble() == "slow to start" => return Progress::Waiting,
+            None if commanded.command.trouble().starts_with("slow to start") => return Progress::Waiting,
             // A former life has started it.
             None => *self.running.entry(commanded.id).or_insert(Self::ends(now, commanded.command)),
         };
@@ -128,7 +130,7 @@ impl<C: Script> Executor<C> for Scripted<C> {
     }
 
     fn recover(&mut self, _: Now, commanded: Commanded<'_, C>, _: CommandState) -> bool {
-        commanded.command.trouble() != "not to be recovered"
+        !commanded.command.trouble().ends_with("not to be recovered")
     }
 
     fn next_deadline(&self) -> Option<Monotonic> {

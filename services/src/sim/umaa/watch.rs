@@ -1,8 +1,9 @@
 //! The conformance monitor as a checker: it is told what is written, at its source and in its order.
 
 use super::commands::{RudderCommand, VectorCommand, VectorExecutionStatus};
-use super::keeper::Wrote;
 use super::outside::entity_of;
+use super::tampered::LifeEnded;
+use super::wrote::Wrote;
 use crate::conform::{self, Bounds, Decoder, Monitor, Watcher};
 use crate::sim::observe::{Checker, Observation, Seen};
 use crate::sim::options::Options;
@@ -39,8 +40,8 @@ pub(super) fn topics() -> impl Iterator<Item = TopicInfo> {
 /// How long the monitor waits for what is owed: as long as faults may hold it up.
 fn bounds(options: &Options) -> Bounds {
     let faults = &options.faults;
-    // What one says is on its way to the other, and an answer to what was before on its way back.
-    let unheard = 4 * options.delay.1;
+    // What one says is on its way to the disk and to the other, and an answer to what was before on its way back.
+    let unheard = 4 * options.delay.1 + 8 * options.disk_latency.1;
     // Commands here run for seconds, and what does not follow within them would never be missed.
     let usual = Bounds { unheard, follow: Duration::from_secs(2), ..Bounds::default() };
     let some = [faults.session_drops, faults.partitions, faults.crashes, faults.stalls];
@@ -103,8 +104,11 @@ impl Checker for Watch {
                 if let Some(Wrote(envelope)) = fact.downcast() {
                     self.wrote(observation.at, envelope);
                 }
+                if let (Some(LifeEnded(of)), Some(watcher)) = (fact.downcast(), &mut self.watcher) {
+                    watcher.vanished(observation.at, *of);
+                }
             }
-            // What the services write that every node has, as far as the bus carries it.
+            // What the services write that every node has outlives no process; it is judged as far as the bus carries it.
             Seen::Published(envelope) if envelope.message.label.source().service < ServiceId::ALLOCATION => {
                 self.wrote(observation.at, envelope);
             }

@@ -78,6 +78,10 @@ impl Service for Arbiter {
         true
     }
 
+    fn goes_by_what_is_kept(&self) -> bool {
+        true
+    }
+
     fn handle(&mut self, now: Now, input: Input<'_>, out: &mut Outbox) {
         if let Input::Message(envelope) = &input
             && envelope.message.call.is_some()

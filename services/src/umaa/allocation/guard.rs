@@ -2,7 +2,7 @@
 
 use super::super::command::decisions::failure_at_preemption;
 use super::super::command::{Admission, Failure, FailureKind, Verdict, is_about};
-use super::settings::believed_for;
+use super::settings::{believed_for, repeat_every};
 use crate::service::{Input, Level, Outbox};
 use aldis_envelope::umaa::{
     self, Key, ResourceAllocationConfigReport, ResourceAllocationReport, SourceKey, Topic,
@@ -33,7 +33,7 @@ impl GuardSettings {
 /// How old what an arbiter said is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Age {
-    /// It was said before this guard was there, it is not known when.
+    /// It was said before this guard was there, or while it stood still: it is not known when.
     Unknown,
     /// It was news then.
     Since(Monotonic),
@@ -61,6 +61,10 @@ pub struct Guard {
     related: BTreeMap<Guid, BTreeSet<Guid>>,
     /// Whether what is heard now is news.
     is_news: bool,
+    /// When it was last given anything. It looks at the clock often enough to know when it has stood still.
+    last_seen: Monotonic,
+    /// It has stood still, and what has waited for it meanwhile may come until then.
+    distrusts_until: Option<Monotonic>,
     /// Until when an arbiter may yet be heard after the start.
     waits_until: Option<Monotonic>,
     is_in_conflict: bool,
@@ -76,6 +80,8 @@ impl Guard {
             heard: BTreeMap::new(),
             related: BTreeMap::new(),
             is_news: false,
+            last_seen: Monotonic::START,
+            distrusts_until: None,
             waits_until: None,
             is_in_conflict: false,
         }
@@ -137,7 +143,8 @@ impl Guard {
                 .map(|end| now.monotonic + Duration::from_nanos(u64::try_from(left(end)).unwrap_or(0)));
             (session.controlling_consumer, ends)
         });
-        let age = if self.is_news { Age::Since(now.monotonic) } else { Age::Unknown };
+        let is_news = self.is_news && self.distrusts_until.is_none();
+        let age = if is_news { Age::Since(now.monotonic) } else { Age::Unknown };
         if self.heard.len() >= ARBITERS_MAX && !self.heard.contains_key(&report.source) {
             let believed: BTreeSet<_> = self.believed(now).map(|heard| heard.writer).collect();
             self.heard.retain(|_, heard| believed.contains(&heard.writer));
@@ -187,6 +194,18 @@ impl Guard {
         honest
     }
 
+    /// Whether it has stood still since the last time: then reports have waited, longer than they are believed maybe, and are no
+    /// news when they come. What comes a repetition later is.
+    fn look_at_the_clock(&mut self, now: Now) {
+        let lease = self.settings.reader_lease;
+        if self.is_news && now.monotonic - self.last_seen > repeat_every(lease) {
+            self.distrusts_until = Some(now.monotonic + repeat_every(lease));
+            self.waits_until = Some(now.monotonic + believed_for(lease));
+        }
+        self.distrusts_until = self.distrusts_until.filter(|until| now.monotonic < *until);
+        self.last_seen = now.monotonic;
+    }
+
     /// Nothing is heard of a writer any more: until it is heard again, it names nobody.
     fn lost(&mut self, is_lost: impl Fn(Source) -> bool) {
         for heard in self.heard.values_mut().filter(|heard| is_lost(heard.writer)) {
@@ -213,6 +232,7 @@ impl Admission for Guard {
     }
 
     fn observe(&mut self, now: Now, input: &Input<'_>, out: &mut Outbox) {
+        self.look_at_the_clock(now);
         match input {
             Input::Message(envelope) if is_about::<ResourceAllocationReport>(envelope) => {
                 self.report(now, envelope, out);
@@ -261,7 +281,8 @@ impl Admission for Guard {
     }
 
     fn next_deadline(&self) -> Option<Monotonic> {
-        self.waits_until
+        let clock = self.last_seen + repeat_every(self.settings.reader_lease) / 2;
+        Some(self.waits_until.map_or(clock, |until| until.min(clock)))
     }
 }
 

@@ -51,7 +51,16 @@ impl Watch {
         let report =
             ResourceAllocationReport { control_info, time_stamp, source: guids().of_service(arbiter) };
         let message = umaa::put(umaa::label::<ResourceAllocationReport>(arbiter).unwrap(), &report);
+        self.pass(at);
         self.guard.observe(now(at), &Input::Message(&envelope(message)), &mut self.out);
+    }
+
+    /// Time passes, and the guard is given its deadlines.
+    fn pass(&mut self, until: f64) {
+        while let Some(at) = self.guard.next_deadline().filter(|at| *at <= now(until).monotonic) {
+            let at = Now { monotonic: at, ..now(0.0) };
+            self.guard.observe(at, &Input::Deadline, &mut self.out);
+        }
     }
 
     fn end(&mut self, at: f64, arbiter: Source, change: Change) {
@@ -126,7 +135,6 @@ fn what_was_retained_before_is_believed_once_it_is_repeated() {
     watch.guard.observe(now(0.0), &Input::HistoryComplete(true), &mut watch.out);
     // Its age is not known, so the answer waits for the next repetition, but not for ever.
     assert_eq!(watch.guard.admits(now(1.0), ONE), Verdict::Later);
-    assert_eq!(watch.guard.next_deadline(), Some(now(6.0).monotonic));
     // What it executed for another in a former life ends at once: the one who is named may be in control already.
     assert!(watch.guard.ends(now(0.0), OTHER).is_some());
     assert_eq!(watch.guard.ends(now(0.0), ONE), None);
@@ -135,8 +143,22 @@ fn what_was_retained_before_is_believed_once_it_is_repeated() {
     let guard = Guard::new(source(400, 100), guids(), GuardSettings::new(RESOURCE));
     let mut silent = Watch { guard, out: Outbox::new(source(400, 100)) };
     silent.guard.observe(now(0.0), &Input::HistoryComplete(true), &mut silent.out);
-    silent.guard.observe(now(6.0), &Input::Deadline, &mut silent.out);
+    silent.pass(6.0);
     assert!(matches!(silent.guard.admits(now(6.0), ONE), Verdict::Failed(_)));
+}
+
+#[test]
+fn what_has_waited_while_the_guard_stood_still_is_no_news() {
+    let mut watch = Watch::new();
+    watch.hear(1.0, arbiter(), Some((ONE, None)));
+    // Nothing until now: what comes now may have been said long ago.
+    let late = now(25.0);
+    watch.guard.observe(late, &Input::Deadline, &mut watch.out);
+    watch.hear(25.0, arbiter(), Some((ONE, None)));
+    assert_eq!(watch.guard.admits(late, ONE), Verdict::Later);
+    // A repetition later it is news again.
+    watch.hear(27.5, arbiter(), Some((OTHER, None)));
+    assert!(watch.admits(27.5, OTHER) && !watch.admits(27.5, ONE));
 }
 
 #[test]

@@ -59,6 +59,10 @@ impl<C: Command, E: Executor<C>, A: Admission> Service for Provider<C, E, A> {
         true
     }
 
+    fn goes_by_what_is_kept(&self) -> bool {
+        true
+    }
+
     fn handle(&mut self, now: Now, input: Input<'_>, out: &mut Outbox) {
         if let Input::Message(envelope) = &input
             && envelope.message.call.is_some()
