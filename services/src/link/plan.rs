@@ -1,5 +1,6 @@
 //! The budget dry run: what a load costs on a link before anything is sent, and what starves.
 
+use super::path::ACK_DELAY;
 use super::{CarrierConfig, Class, TAG_BYTES};
 use std::time::Duration;
 
@@ -70,8 +71,7 @@ pub fn plan(carrier: &CarrierConfig, keyed: bool, flows: &[Flow], back: &[Flow])
         let room = carrier.mtu as f64 - PIECE_OVERHEAD - tag;
         let cost = match flow.class {
             Class::Command => copies * (bytes + COMMAND_OVERHEAD + tag),
-            // A lost sample is not sent again once a newer one is there.
-            Class::State => bytes + STATE_OVERHEAD + tag,
+            Class::State => state_copies(carrier, flow) * (bytes + STATE_OVERHEAD + tag),
             Class::Bulk => bytes / room * carrier.mtu as f64 / (1.0 - loss),
         };
         cost * flow.per_second
@@ -121,6 +121,16 @@ pub fn plan(carrier: &CarrierConfig, keyed: bool, flows: &[Flow], back: &[Flow])
         worst_command: Duration::from_secs_f64(worst),
         resync: Duration::from_secs_f64(resync),
     }
+}
+
+/// How many copies of a sample go out on average: a lost one goes again, unless a newer one is there before the loss is known.
+fn state_copies(carrier: &CarrierConfig, flow: &Flow) -> f64 {
+    let loss = carrier.loss.clamp(0.0, 0.9);
+    let known_after = carrier.round_trip.as_secs_f64() * 1.1
+        + carrier.mtu as f64 / carrier.rate as f64
+        + ACK_DELAY.as_secs_f64();
+    let turns = f64::from(flow.instances) / flow.per_second.max(1e-9) / known_after;
+    (0..16).map(|turn| loss.powi(turn) * (turns - f64::from(turn) + 1.0).clamp(0.0, 1.0)).sum()
 }
 
 /// How many copies of a command go out on average: one, and where no word comes, rounds of more.

@@ -12,7 +12,7 @@ use fill::Load;
 use std::time::Duration;
 
 /// While nobody is heard and something waits, a frame goes out so often, at least twice a second.
-const PROBE_EVERY: Duration = Duration::from_millis(100);
+const PROBE_EVERY: Duration = Duration::from_millis(70);
 
 /// Of the frames that look for the peer, every so many says hello, in case the peer does not know this place.
 const HELLO_EVERY: u32 = 10;
@@ -197,6 +197,7 @@ impl Link {
         let mut at = |moment: Option<Monotonic>| next = next.into_iter().chain(moment).min();
         at(self.outbox.next_expiry());
         at(self.states.deadline());
+        at(self.unwritten.due());
         at(self.silence_deadline());
         let idle = !self.is_due(now);
         for index in 0..self.paths.len() {

@@ -15,7 +15,7 @@ struct End {
     delivered: Vec<Delivery>,
     tickets: Vec<(Ticket, TicketState)>,
     notes: Vec<String>,
-    journal: BTreeMap<Vec<u8>, Vec<u8>>,
+    journal: BTreeMap<Bytes, Bytes>,
 }
 
 fn entity(number: u64) -> EntityId {
@@ -39,7 +39,7 @@ fn now(milliseconds: u64) -> Now {
 }
 
 impl End {
-    fn new(config: LinkConfig, boot: u64, journal: BTreeMap<Vec<u8>, Vec<u8>>) -> Self {
+    fn new(config: LinkConfig, boot: u64, journal: BTreeMap<Bytes, Bytes>) -> Self {
         let carriers: Vec<_> = config.carriers.iter().map(|carrier| carrier.id).collect();
         let link = Link::new(config, BootId(boot));
         let (frames, delivered, tickets, notes) = Default::default();

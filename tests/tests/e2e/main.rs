@@ -5,6 +5,7 @@
 mod access;
 mod allocation;
 mod calls;
+mod custody;
 mod foreign;
 mod journal;
 mod link;

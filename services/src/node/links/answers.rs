@@ -43,7 +43,7 @@ impl Node {
     }
 
     fn link_statuses(&self, now: Now) -> Bytes {
-        aldis::encode(&self.links.statuses(now.monotonic)).into()
+        aldis::encode(&self.links.statuses(now.monotonic, self.journaling.is_there())).into()
     }
 
     fn queued(&self, now: Now, asked: &told::QueueQuery) -> Vec<told::QueuedCommand> {
@@ -68,11 +68,11 @@ impl Node {
 
 /// The status of every link, filled in with what the node knows.
 impl Links {
-    fn statuses(&self, now: Monotonic) -> Vec<told::LinkStatus> {
+    fn statuses(&self, now: Monotonic, durable: bool) -> Vec<told::LinkStatus> {
         let status = |attached: &Attached| told::LinkStatus {
             name: attached.spec.name.clone(),
             behind: attached.spec.export.behind.iter().copied().collect(),
-            durable: self.journaled,
+            durable,
             services: attached.services.iter().copied().collect(),
             ..attached.link.status(now)
         };

@@ -300,7 +300,6 @@ impl Workload for UmaaFleet {
                 services,
                 bridges: Vec::new(),
                 links: Vec::new(),
-                journaled: false,
             }
         };
         arrangement.entities.iter().map(node).collect()
