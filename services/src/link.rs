@@ -301,6 +301,16 @@ impl Link {
         (self.outbox.len(), self.states.waiting(), self.bulk_out.bytes())
     }
 
+    /// How many commands wait or are on the air, and their bytes.
+    pub fn commands(&self) -> (usize, usize) {
+        (self.outbox.len(), self.outbox.bytes())
+    }
+
+    /// The life of its node, where that is known only when the journal is read back.
+    pub fn set_boot(&mut self, boot: BootId) {
+        self.boot = boot;
+    }
+
     /// Whether the peer was heard lately.
     pub fn is_heard(&self) -> bool {
         self.heard

@@ -12,7 +12,7 @@ use fill::Load;
 use std::time::Duration;
 
 /// While nobody is heard and something waits, a frame goes out so often, at least twice a second.
-const PROBE_EVERY: Duration = Duration::from_millis(70);
+const PROBE_EVERY: Duration = Duration::from_millis(100);
 
 /// Of the frames that look for the peer, every so many says hello, in case the peer does not know this place.
 const HELLO_EVERY: u32 = 10;

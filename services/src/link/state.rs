@@ -19,7 +19,7 @@ pub(super) const SHORT_NUMBERS: u64 = 128;
 
 /// How many samples may be on the air for the last of them to go twice: about a frame of the shortest. More, and the bytes are worth
 /// more than the time.
-const AGAIN_MAX: usize = 10;
+const AGAIN_MAX: usize = 12;
 
 /// Times in short form are told modulo so many units: 1 024 s.
 pub(super) const SHORT_TIMES: i64 = 1 << 14;

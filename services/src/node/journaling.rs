@@ -42,8 +42,6 @@ pub(super) struct Journaling {
     stage: Stage,
     /// What stands, by number.
     records: BTreeMap<u64, Bytes>,
-    /// What stands of links, until they take it.
-    pub(super) of_links: Vec<(Bytes, Bytes)>,
     /// When the journal was begun, in nanoseconds on the wall clock of that time.
     begun: Option<u64>,
     /// What came before the node could start.
@@ -127,7 +125,7 @@ impl Node {
     /// What the journal tells.
     pub(super) fn journal(&mut self, now: Now, event: JournalEvent, effects: &mut Vec<Effect>) {
         match event {
-            JournalEvent::Recovered { space, key, value } => self.read_back(space, key, value),
+            JournalEvent::Recovered { space, key, value } => self.read_back(now, space, key, value),
             JournalEvent::RecoveredAll(recovered) => self.all_read_back(now, recovered, effects),
             JournalEvent::Written { up_to } => {
                 self.keeping.written(up_to);
@@ -150,9 +148,9 @@ impl Node {
         }
     }
 
-    fn read_back(&mut self, space: u8, key: Bytes, value: Bytes) {
+    fn read_back(&mut self, now: Now, space: u8, key: Bytes, value: Bytes) {
         match (space, key[..].try_into()) {
-            (OF_LINKS, _) => self.journaling.of_links.push((key, value)),
+            (OF_LINKS, _) => self.link_read_back(now, key, value),
             (SAMPLES, Ok(number)) => drop(self.journaling.records.insert(u64::from_be_bytes(number), value)),
             (OF_NODE, _) if key[..] == *BEGUN => {
                 self.journaling.begun = value[..].try_into().ok().map(u64::from_be_bytes);

@@ -66,6 +66,14 @@ impl Node {
     }
 }
 
+impl Node {
+    /// How many commands wait to cross the links of this node, and their bytes.
+    pub fn queued_commands(&self) -> (usize, usize) {
+        let links = self.links.all.iter().map(|attached| attached.link.commands());
+        links.fold((0, 0), |(count, bytes), (more, of_them)| (count + more, bytes + of_them))
+    }
+}
+
 /// The status of every link, filled in with what the node knows.
 impl Links {
     fn statuses(&self, now: Monotonic, durable: bool) -> Vec<told::LinkStatus> {

@@ -3,25 +3,27 @@
 use super::Node;
 use crate::event::Effect;
 use crate::journal::Refused;
-use crate::link::{self, BatchId, Link, Record, record_prefix};
+use crate::link::{self, BatchId, Record, record_prefix};
 use crate::service::Level;
 use aldis_envelope::Now;
+use bytes::Bytes;
 
 impl Node {
-    /// Links begin the life of their node, with what the journal holds of them.
+    /// A record that the journal holds of a link. It is taken at once, because there may be very many.
+    pub(in crate::node) fn link_read_back(&mut self, now: Now, key: Bytes, value: Bytes) {
+        let of = |attached: &&mut super::Attached| key.starts_with(&record_prefix(attached.spec.link.peer));
+        // What belongs to a link that is configured no more stays in the journal, in case it comes back.
+        if let Some(attached) = self.links.all.iter_mut().find(of) {
+            let mut wishes = Vec::new();
+            attached.link.handle(now, &mut vec![link::Event::ReadBack { key, value }], &mut wishes);
+            attached.wishes.extend(wishes);
+        }
+    }
+
+    /// Links begin the life of their node.
     pub(in crate::node) fn start_links(&mut self, now: Now, effects: &mut Vec<Effect>) {
-        for attached in &mut self.links.all {
-            attached.link = Link::new(attached.spec.link.clone(), self.config.boot);
-        }
-        for (key, value) in std::mem::take(&mut self.journaling.of_links) {
-            let links = &self.links.all;
-            // What belongs to a link that is configured no more stays in the journal, in case it comes back.
-            if let Some(place) =
-                links.iter().position(|link| key.starts_with(&record_prefix(link.spec.link.peer)))
-            {
-                self.links.give(place, link::Event::ReadBack { key, value });
-            }
-        }
+        let boot = self.config.boot;
+        self.links.all.iter_mut().for_each(|attached| attached.link.set_boot(boot));
         for place in 0..self.links.all.len() {
             self.links.give(place, link::Event::ReadBackEnd);
             if !self.journaling.is_there() {

@@ -301,7 +301,7 @@ fn g14(bench: &Bench) -> Row {
 
 /// `link plan` against a run.
 fn planned(bench: &Bench) -> Row {
-    let forecasts = rows::forecasts(&bench.setting(), bench.count(3_600).max(300));
+    let forecasts = rows::forecasts(&bench.setting(), bench.count(3_600).max(300), true);
     let worst = forecasts.iter().map(rows::Forecast::error).fold(0.0, f64::max);
     let words = forecasts.iter().map(|f| format!("{}: {:.1} for {:.1} B/s", f.load, f.planned, f.measured));
     let measured = format!("{:.1} % off at most; {}", worst * 100.0, words.collect::<Vec<_>>().join(", "));

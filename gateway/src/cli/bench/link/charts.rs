@@ -39,7 +39,11 @@ pub(super) fn write(
 fn step(length: f64) -> f64 {
     let rough = (length / STEPS).max(1e-9);
     let power = 10f64.powf(rough.log10().floor());
-    [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power).into_iter().find(|step| *step >= rough).unwrap_or(rough)
+    [1.0, 2.0, 5.0, 10.0]
+        .map(|factor| factor * power)
+        .into_iter()
+        .find(|step| *step >= rough)
+        .unwrap_or(rough)
 }
 
 /// A chart as SVG. Both axes begin at zero.
@@ -47,10 +51,7 @@ fn picture(chart: &Chart, link: &str) -> String {
     let points = || chart.lines.iter().flat_map(|(_, points)| points);
     let most = |of: fn(&(f64, f64)) -> f64| points().map(of).fold(1e-9, f64::max);
     let (across, up) = (step(most(|point| point.0)), step(most(|point| point.1)));
-    let ends = (
-        (most(|point| point.0) / across).ceil() * across,
-        (most(|point| point.1) / up).ceil() * up,
-    );
+    let ends = ((most(|point| point.0) / across).ceil() * across, (most(|point| point.1) / up).ceil() * up);
     let x = |value: f64| LEFT + value / ends.0 * (WIDTH - LEFT - RIGHT);
     let y = |value: f64| HEIGHT - BOTTOM - value / ends.1 * (HEIGHT - TOP - BOTTOM);
     let mut out = format!(
@@ -60,9 +61,16 @@ fn picture(chart: &Chart, link: &str) -> String {
     let mut axis = |line: [f64; 4], text: (f64, f64), anchor: &str, value: f64| {
         let [x1, y1, x2, y2] = line;
         // Writing to a String cannot fail.
-        let _ = writeln!(out, "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke=\"#ddd\"/>");
+        let _ = writeln!(
+            out,
+            "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke=\"#ddd\"/>"
+        );
         let shown = (value * 1e3).round() / 1e3;
-        let _ = writeln!(out, "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{shown}</text>", text.0, text.1);
+        let _ = writeln!(
+            out,
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{shown}</text>",
+            text.0, text.1
+        );
     };
     for number in 0..=(ends.0 / across).round() as u32 {
         let at = x(f64::from(number) * across);
@@ -73,10 +81,16 @@ fn picture(chart: &Chart, link: &str) -> String {
         axis([x(0.0), at, x(ends.0), at], (x(0.0) - 6.0, at + 4.0), "end", f64::from(number) * up);
     }
     for (place, ((name, points), colour)) in chart.lines.iter().zip(COLOURS.iter().cycle()).enumerate() {
-        let corners: Vec<_> = points.iter().map(|point| format!("{:.1},{:.1}", x(point.0), y(point.1))).collect();
-        let _ = writeln!(out, "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>", corners.join(" "));
+        let corners: Vec<_> =
+            points.iter().map(|point| format!("{:.1},{:.1}", x(point.0), y(point.1))).collect();
+        let _ = writeln!(
+            out,
+            "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>",
+            corners.join(" ")
+        );
         let height = TOP + 4.0 + 16.0 * place as f64;
-        let _ = writeln!(out, "<text x=\"{:.1}\" y=\"{height:.1}\" fill=\"{colour}\">{name}</text>", LEFT + 10.0);
+        let _ =
+            writeln!(out, "<text x=\"{:.1}\" y=\"{height:.1}\" fill=\"{colour}\">{name}</text>", LEFT + 10.0);
     }
     let _ = writeln!(
         out,

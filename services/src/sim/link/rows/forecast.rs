@@ -48,9 +48,13 @@ fn loads() -> Vec<Load> {
     ]
 }
 
-/// Each load for so many seconds.
-pub(in crate::sim::link) fn forecasts(setting: &Setting, seconds: u64) -> Vec<Forecast> {
-    loads().iter().map(|load| forecast(setting, load, Duration::from_secs(seconds))).collect()
+/// Each load for so many seconds; `all` has those too that fill the link.
+pub(in crate::sim::link) fn forecasts(setting: &Setting, seconds: u64, all: bool) -> Vec<Forecast> {
+    let of_all = loads();
+    let fits = |load: &&Load| {
+        all || load.there.iter().all(|flow| flow.per_second < 10.0 && flow.class != Class::Bulk)
+    };
+    of_all.iter().filter(fits).map(|load| forecast(setting, load, Duration::from_secs(seconds))).collect()
 }
 
 fn forecast(setting: &Setting, load: &Load, lasts: Duration) -> Forecast {
@@ -67,17 +71,18 @@ fn forecast(setting: &Setting, load: &Load, lasts: Duration) -> Forecast {
     let mut pair = setting.warm_pair();
     let mut random = fastrand::Rng::with_seed(setting.seed ^ 0x666f_7265);
     let start = pair.world.now();
-    // Every flow has its own moments, drawn so that they do not meet again and again.
+    // Every flow begins at a moment of its own.
+    let phase =
+        |random: &mut fastrand::Rng, flow: &Flow| Duration::from_secs_f64(random.f64() / flow.per_second);
     let flows = load.there.iter().map(|flow| (true, flow)).chain(load.back.iter().map(|flow| (false, flow)));
     let mut due: Vec<(Monotonic, u64, bool, &Flow)> =
-        flows.map(|(there, flow)| (start, 0, there, flow)).collect();
+        flows.map(|(there, flow)| (start + phase(&mut random, flow), 0, there, flow)).collect();
     let before = pair.world.bytes(pair.vehicle);
     while pair.world.now() - start < lasts {
         let now = pair.world.now();
         for (at, number, there, flow) in due.iter_mut().filter(|(at, ..)| *at <= now) {
             *number += 1;
-            let gap = 2.0 * random.f64() / flow.per_second;
-            *at = *at + Duration::from_secs_f64(gap);
+            *at = *at + Duration::from_secs_f64(1.0 / flow.per_second);
             let (from, to) = if *there { (VEHICLE, SHORE) } else { (SHORE, VEHICLE) };
             let (port, at) = (if *there { pair.vehicle } else { pair.shore }, now.elapsed());
             let envelope = match flow.class {
@@ -106,7 +111,7 @@ mod tests {
     #[test]
     fn the_plan_says_the_bytes_of_a_run_within_a_tenth() {
         let setting = Setting { profile: Profile::L1, keyed: false, seed: 3 };
-        for forecast in forecasts(&setting, 600) {
+        for forecast in forecasts(&setting, 2_400, false) {
             assert!(forecast.error() < 0.1, "{forecast:?}");
         }
     }
