@@ -301,9 +301,9 @@ impl Link {
         (self.outbox.len(), self.states.waiting(), self.bulk_out.bytes())
     }
 
-    /// How many commands wait or are on the air, and their bytes.
+    /// How many commands wait or are on the air, those of the link itself aside, and their bytes.
     pub fn commands(&self) -> (usize, usize) {
-        (self.outbox.len(), self.outbox.bytes())
+        self.outbox.commands()
     }
 
     /// The life of its node, where that is known only when the journal is read back.

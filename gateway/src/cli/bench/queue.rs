@@ -132,14 +132,10 @@ impl QueuePeer {
         };
         let before = resident_kib();
         shell.start()?;
-        let already = shell.node.queued_commands().0 as u64;
-        let mut seconds = begin.elapsed().as_secs_f64();
-        if self.fill > 0 {
-            while (shell.node.queued_commands().0 as u64) < already + self.fill {
-                shell.turn(Event::Deadline)?;
-            }
-            seconds = begin.elapsed().as_secs_f64();
+        for _ in 0..self.fill.div_ceil(AT_ONCE) {
+            shell.turn(Event::Deadline)?;
         }
+        let seconds = begin.elapsed().as_secs_f64();
         let (commands, bytes) = shell.node.queued_commands();
         print_line(json!({
             "commands": commands, "bytes": bytes, "resident_kib": resident_kib(), "resident_before_kib": before,

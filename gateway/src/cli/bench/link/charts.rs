@@ -113,7 +113,7 @@ mod tests {
         let lines = vec![("a line", vec![(0.0, 0.0), (60.0, 240.0)])];
         let chart = Chart { name: "n", across: "x", up: "y", lines };
         let drawn = picture(&chart, "L1");
-        assert!(drawn.contains("points=\"60.0,350.0 620.0,46.0\""), "{drawn}");
+        assert!(drawn.contains("points=\"60.0,350.0 620.0,42.8\""), "{drawn}");
         assert!(drawn.ends_with("</svg>\n") && drawn.contains("a line"));
     }
 }

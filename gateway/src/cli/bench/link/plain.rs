@@ -8,7 +8,7 @@ use serde_json::Value;
 use std::net::SocketAddr;
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
-use zenoh::qos::{CongestionControl, Priority, Reliability};
+use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Session, Wait};
 
 const KEY: &str = "bench/order";
@@ -55,7 +55,6 @@ pub(super) fn run(real: &Real, against: &str) -> Result<Value, Failure> {
         .declare_publisher(KEY)
         .congestion_control(CongestionControl::Block)
         .priority(Priority::RealTime)
-        .reliability(Reliability::Reliable)
         .express(true)
         .wait()
         .map_err(failed)?;

@@ -155,7 +155,8 @@ impl Real {
         let far = free_address()?;
         let shore = files.node(self, 1, 400, (listen, relay.address), ports[0])?;
         let vehicle = files.node(self, 400, 1, (far, relay.address), ports[1])?;
-        let _nodes = [shore, vehicle].map(|path| Process::start(&["run", &path.display().to_string()]));
+        let start = |path: PathBuf| Process::start(&["run", &path.display().to_string()]);
+        let _nodes = [start(shore)?, start(vehicle)?];
         let [mut from, mut to] = [Uxas::connect(ports[0])?, Uxas::connect(ports[1])?];
         // The two ends meet, and what has no number is not counted.
         let met = Instant::now() + MEET_WITHIN;
