@@ -1,7 +1,7 @@
 //! All that a node can be told, and all that it can ask for. A shell knows nothing else of it.
 
 use crate::journal::{Batch, JournalEvent};
-use crate::link::{CarrierId, Record};
+use crate::link::CarrierId;
 use crate::service::{ComponentHealth, Job, JobOutput, Note};
 use aldis_envelope::codec::native::HeaderError;
 use aldis_envelope::codec::stream::StreamError;
@@ -52,14 +52,6 @@ pub enum Event {
     Peer(BridgeId, PeerId, PeerEvent),
     /// Something at a link.
     Link(LinkId, LinkEvent),
-    /// A record of the links that stood in the journal at the start. Before [`Event::ReadBackEnd`] alone.
-    ReadBack(Record),
-    /// The journal has told all that it held.
-    ReadBackEnd,
-    /// The records of [`Effect::Persist`] with this number are safe.
-    Persisted(u64),
-    /// They were not written, and why.
-    PersistFailed(u64, String),
     /// A job is done, or panicked with this text.
     Job(Source, u64, Result<JobOutput, String>),
     /// The health of something that the shell looks after changed.
@@ -167,9 +159,6 @@ pub enum Effect {
     Transmit(LinkId, CarrierId, Vec<u8>),
     /// The peer of a link is at this place: what came from there was authentic.
     Found(LinkId, CarrierId, Place),
-    /// Write these records as one, then tell with [`Event::Persisted`] and this number. Batches are written in their order. Comes
-    /// only where the configuration says that there is a journal.
-    Persist(u64, Vec<Record>),
     /// Stop (true) or go on reading from peers and bus.
     PauseInput(bool),
     /// Compute something outside the loop and tell with [`Event::Job`].

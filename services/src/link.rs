@@ -27,6 +27,7 @@ mod sent;
 mod session;
 mod state;
 mod status;
+mod unwritten;
 mod wire;
 
 pub use event::{
@@ -53,6 +54,7 @@ use record::RecordKeys;
 use session::Session;
 use state::States;
 use std::collections::BTreeMap;
+use unwritten::{Batch, Unwritten};
 
 /// What is configured of a link.
 #[derive(Debug, Clone)]
@@ -179,7 +181,8 @@ pub struct Link {
     keys: RecordKeys,
     records: Vec<Record>,
     after_write: Vec<AfterWrite>,
-    batches: BTreeMap<BatchId, Vec<AfterWrite>>,
+    batches: BTreeMap<BatchId, Batch>,
+    unwritten: Unwritten,
     next_batch: u64,
     reserved: u64,
     /// Commands of which a whole copy has just gone out, with how many there were.
@@ -232,6 +235,7 @@ impl Link {
             records: Vec::new(),
             after_write: Vec::new(),
             batches: BTreeMap::new(),
+            unwritten: Unwritten::default(),
             next_batch: 0,
             reserved: 1,
             gone_out: Vec::new(),
@@ -244,12 +248,13 @@ impl Link {
     pub fn handle(&mut self, now: Now, events: &mut Vec<Event>, effects: &mut Vec<Effect>) {
         for event in events.drain(..) {
             self.on_event(now, event, effects);
+            self.flush_much(now.monotonic, effects);
         }
         if self.ready {
             self.pass_time(now, effects);
             self.transmit(now, effects);
         }
-        self.flush(effects);
+        self.flush(now.monotonic, effects);
         self.arm(now.monotonic, effects);
     }
 
@@ -267,7 +272,7 @@ impl Link {
             Event::ReadBack { key, value } => self.on_read_back(now, &key, &value),
             Event::ReadBackEnd => self.on_read_back_end(now, effects),
             Event::Written(batch) => self.on_written(now, batch, effects),
-            Event::WriteFailed(batch, why) => self.on_write_failed(batch, &why, effects),
+            Event::WriteFailed(batch, why) => self.on_write_failed(now.monotonic, batch, &why, effects),
             Event::Done { delivery, with } => {
                 if self.inbox.finish(delivery.0) {
                     self.records.push(self.keys.forget(record::Kind::Incoming, delivery.0));
@@ -294,6 +299,16 @@ impl Link {
     /// Commands, instances and bytes of large messages that wait.
     pub fn waiting(&self) -> (usize, usize, usize) {
         (self.outbox.len(), self.states.waiting(), self.bulk_out.bytes())
+    }
+
+    /// How many commands wait or are on the air, those of the link itself aside, and their bytes.
+    pub fn commands(&self) -> (usize, usize) {
+        self.outbox.commands()
+    }
+
+    /// The life of its node, where that is known only when the journal is read back.
+    pub fn set_boot(&mut self, boot: BootId) {
+        self.boot = boot;
     }
 
     /// Whether the peer was heard lately.

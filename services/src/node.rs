@@ -19,7 +19,7 @@ use crate::dds::{TopicRule, Topics};
 use crate::event::{BridgeId, Effect, Event, LinkId, PeerId, PublisherId};
 use crate::host::Hosted;
 use crate::labels::Labels;
-use crate::link::LinkSpec;
+use crate::link::{DeliveryId, LinkSpec};
 use crate::notes::Notes;
 use crate::registry;
 use crate::service::{Action, Component, ComponentHealth, Condition, Input, Level, ServiceSpec};
@@ -63,8 +63,6 @@ pub struct NodeConfig {
     pub bridges: Vec<BridgeSpec>,
     /// The links across which other entities are reached.
     pub links: Vec<LinkSpec>,
-    /// Whether the shell keeps a journal: it tells what stood in it, then carries out [`Effect::Persist`].
-    pub journaled: bool,
 }
 
 /// Where a message came from.
@@ -79,6 +77,8 @@ enum Origin {
 /// What the stamp keeps of a message that came by a link.
 #[derive(Debug, Clone)]
 struct Passed {
+    /// Its number in the link, where it is to be answered.
+    delivery: Option<DeliveryId>,
     source_time: Wall,
     lifespan_left_ms: Option<u32>,
     priority: Priority,
@@ -165,7 +165,7 @@ impl Node {
             services: config.services.iter().cloned().chain(stand_ins).map(Hosted::new).collect(),
             bridges: config.bridges.iter().map(|spec| Bridge::new(spec.clone(), &config.entities)).collect(),
             sharing: Sharing::new(Topics::new(config.topics.clone())),
-            links: Links::new(&config.links, config.journaled, config.boot, &config.fleet),
+            links: Links::new(&config.links, config.boot, &config.fleet),
             config,
             keeping: Keeping::default(),
             journaling: Journaling::default(),
@@ -215,6 +215,11 @@ impl Node {
         for event in events.drain(..) {
             self.event(now, event, effects);
             self.settle(now, effects);
+            if self.keeping.has_much() {
+                // What came of this event is written as one, and not with what more comes in this turn.
+                self.run_links(now, effects);
+                self.keeping.close();
+            }
         }
         self.run_links(now, effects);
         self.finish_sharing(now, effects);
@@ -257,10 +262,6 @@ impl Node {
             }
             Event::Bridge(bridge, event) => self.bridge(now, bridge, event, effects),
             Event::Link(id, event) => self.link_event(now, id, event, effects),
-            Event::ReadBack(record) => self.link_read_back(record),
-            Event::ReadBackEnd => self.link_read_back_end(),
-            Event::Persisted(number) => self.link_written(number, None),
-            Event::PersistFailed(number, why) => self.link_written(number, Some(&why)),
             Event::Job(source, number, result) => self.job_done(now, source, number, result, effects),
             Event::Component(health) => self.component(now, &health),
             Event::Journal(event) => self.journal(now, event, effects),

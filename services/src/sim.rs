@@ -3,12 +3,14 @@
 //! - [`World`] holds machines: nodes with clocks of their own, sessions on the bus, and disks with journals. Faults are its methods:
 //!   sessions that drop, partitions, crashes with torn writes, restarts, stalls, clocks that step.
 //! - [`link`] carries datagrams as a radio does: loss in bursts, delay, reordering, duplicates, a rate, a queue.
+//! - [`custody`] kills gateways on both sides of such a link and counts what was lost and what came twice.
 //! - [`Options`] are drawn from a seed: which faults there are, and how strong.
 //! - A [`Workload`] says which nodes there are and what they do; its [`Checker`]s watch from outside.
 //! - [`run()`] runs a seed: a safety phase with faults, then a liveness phase in which all faults have ended and everything
 //!   must come right. The same seed gives the same trace, byte for byte; [`Report`] holds its hash and, with a violation, its end.
 
 pub mod chatter;
+pub mod custody;
 mod disk;
 mod faults;
 pub mod link;

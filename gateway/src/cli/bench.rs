@@ -10,6 +10,7 @@ mod link;
 mod lmcp;
 mod load;
 mod plan;
+mod queue;
 mod rounds;
 mod service_node;
 mod statistics;
@@ -23,7 +24,7 @@ use clap::Subcommand;
 /// Measure this machine: each figure beside a peer's or the limit's, turn about in the same run.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json\n  aldis bench zmq --json\n  aldis bench lmcp --json\n  aldis bench join --instances 10000 --rate 1000 --json\n  aldis bench umaa --json\n  aldis bench journal --json\n  aldis bench plan --json\n  aldis bench link --profile L1 --json"
+    after_help = "Examples:\n  aldis bench bus --json\n  aldis bench uxas --json\n  aldis bench zmq --json\n  aldis bench lmcp --json\n  aldis bench join --instances 10000 --rate 1000 --json\n  aldis bench umaa --json\n  aldis bench journal --json\n  aldis bench plan --json\n  aldis bench link --profile L1 --json\n  aldis bench queue --json"
 )]
 pub(crate) struct Bench {
     #[command(subcommand)]
@@ -56,8 +57,13 @@ enum What {
     Journal(journal::JournalBench),
     /// How good and how fast plans are.
     Plan(plan::PlanBench),
-    /// The lossy link against its table of goals, in virtual time.
+    /// The lossy link against its table of goals, in virtual time, or with real processes.
     Link(link::LinkBench),
+    /// A long queue for many vehicles: memory, and a restart.
+    Queue(queue::QueueBench),
+    /// The other process of `bench queue`.
+    #[command(hide = true)]
+    QueuePeer(queue::QueuePeer),
     /// The other process of `bench bus`.
     #[command(hide = true)]
     BusPeer(bus::BusPeer),
@@ -92,6 +98,8 @@ impl Bench {
             What::Journal(bench) => bench.run(),
             What::Plan(bench) => bench.run(),
             What::Link(bench) => bench.run(),
+            What::Queue(bench) => bench.run(),
+            What::QueuePeer(peer) => peer.run(),
             What::BusPeer(peer) => peer.run(),
             What::TcpCopy(copy) => copy.run(),
             What::JournalPeer(peer) => peer.run(),

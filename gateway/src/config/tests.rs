@@ -296,6 +296,19 @@ fn every_example_loads() {
 }
 
 #[test]
+fn the_example_of_a_link_loads_and_its_ends_belong_together() {
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/link");
+    let [shore, vehicle] = ["shore.toml", "vehicle-401.toml"]
+        .map(|name| Config::load(&directory.join(name)).unwrap_or_else(|e| panic!("\n{}", drawn(&e))));
+    for (one, other) in [(&shore, &vehicle), (&vehicle, &shore)] {
+        let link = &one.links[0];
+        assert_eq!(link.peer, other.entities.own());
+        assert!(link.behind().contains(&other.entities.own()) && one.journal.is_some());
+        assert_eq!(link.carriers[0].rate_bytes_per_s, other.links[0].carriers[0].rate_bytes_per_s);
+    }
+}
+
+#[test]
 fn files_are_looked_for_beside_the_configuration() {
     let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
     let config = Config::load(&directory.join("router.toml")).unwrap();

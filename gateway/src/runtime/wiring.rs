@@ -191,7 +191,6 @@ pub(crate) fn node_config(config: &Config) -> NodeConfig {
         services,
         bridges: config.bridges.iter().map(|bridge| bridge_spec(own, bridge)).collect(),
         links: config.links.iter().map(|link| link.spec(own)).collect(),
-        journaled: false,
     }
 }
 

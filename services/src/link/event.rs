@@ -36,15 +36,32 @@ pub enum Record {
     /// This key has this value now.
     Put {
         /// The key.
-        key: Vec<u8>,
+        key: Bytes,
         /// The value.
-        value: Vec<u8>,
+        value: Bytes,
     },
     /// This key is gone.
     Forget {
         /// The key.
-        key: Vec<u8>,
+        key: Bytes,
     },
+}
+
+impl Record {
+    /// The key that changes.
+    pub fn key(&self) -> &Bytes {
+        match self {
+            Self::Put { key, .. } | Self::Forget { key } => key,
+        }
+    }
+
+    /// About how many bytes it takes in a journal.
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::Put { key, value } => key.len() + value.len(),
+            Self::Forget { key } => key.len(),
+        }
+    }
 }
 
 /// A message for the peer.
@@ -96,9 +113,9 @@ pub enum Event {
     /// A record that the journal holds under a key of this link. Before [`Event::ReadBackEnd`] alone.
     ReadBack {
         /// The key.
-        key: Vec<u8>,
+        key: Bytes,
         /// The value.
-        value: Vec<u8>,
+        value: Bytes,
     },
     /// The journal has told all that it holds. Nothing is sent or accepted before.
     ReadBackEnd,

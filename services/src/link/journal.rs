@@ -3,10 +3,11 @@
 use super::names::{Definition, NameId, name_of};
 use super::record::Kind;
 use super::session::Life;
+use super::unwritten::{Batch, RECORDS_MAX};
 use super::wire::{Malformed, Reader};
 use super::{BatchId, Class, Delivery, DeliveryId, Effect, Link, Reason, Record, Ticket, TicketState};
 use crate::link::{body, bulk};
-use aldis_envelope::Now;
+use aldis_envelope::{Monotonic, Now};
 
 /// What follows when a batch is safe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,26 +26,38 @@ pub(super) fn name_key(name: NameId) -> u64 {
 }
 
 impl Link {
-    /// Hands what is to be written to the journal, as one batch.
-    pub(super) fn flush(&mut self, effects: &mut Vec<Effect>) {
-        if self.records.is_empty() && self.after_write.is_empty() {
+    /// Hands what is to be written to the journal, as one batch. What was not written before goes along.
+    pub(super) fn flush(&mut self, now: Monotonic, effects: &mut Vec<Effect>) {
+        let again = self.unwritten.due().is_some_and(|due| due <= now);
+        if self.records.is_empty() && self.after_write.is_empty() && !again {
             return;
         }
         if self.records.is_empty()
+            && !again
             && let Some(last) = self.batches.values_mut().next_back()
         {
             // It waits for what is being written already.
-            last.append(&mut self.after_write);
+            last.after.append(&mut self.after_write);
             return;
         }
+        let (mut records, mut after) = self.unwritten.take(now, &self.records);
+        records.append(&mut self.records);
+        after.append(&mut self.after_write);
         let batch = BatchId(self.next_batch);
         self.next_batch += 1;
-        self.batches.insert(batch, std::mem::take(&mut self.after_write));
-        effects.push(Effect::Persist(batch, std::mem::take(&mut self.records)));
+        self.batches.insert(batch, Batch { records: records.clone(), after });
+        effects.push(Effect::Persist(batch, records));
+    }
+
+    /// Hands on what has come together, where it is much: a batch of the journal has a limit.
+    pub(super) fn flush_much(&mut self, now: Monotonic, effects: &mut Vec<Effect>) {
+        if self.records.len() > RECORDS_MAX {
+            self.flush(now, effects);
+        }
     }
 
     pub(super) fn on_written(&mut self, now: Now, batch: BatchId, effects: &mut Vec<Effect>) {
-        for after in self.batches.remove(&batch).unwrap_or_default() {
+        for after in self.batches.remove(&batch).unwrap_or_default().after {
             match after {
                 AfterWrite::Release(number) => self.release(now, number, effects),
                 AfterWrite::Safe(number) => self.inbox.make_safe(number),
@@ -66,20 +79,43 @@ impl Link {
         }
     }
 
-    pub(super) fn on_write_failed(&mut self, batch: BatchId, why: &str, effects: &mut Vec<Effect>) {
+    /// A batch was not written: commands in it are neither accepted nor acknowledged. All else in it holds all the same, and is
+    /// written later.
+    pub(super) fn on_write_failed(
+        &mut self,
+        now: Monotonic,
+        batch: BatchId,
+        why: &str,
+        effects: &mut Vec<Effect>,
+    ) {
         self.counters.journal_failures += 1;
         effects.push(Effect::Note(format!("the journal failed, nothing is accepted or acknowledged: {why}")));
-        for after in self.batches.remove(&batch).unwrap_or_default() {
+        let Batch { records, after } = self.batches.remove(&batch).unwrap_or_default();
+        self.unwritten.keep(now, records);
+        let mut taken = false;
+        for after in after {
             match after {
-                AfterWrite::Safe(number) => self.inbox.undo(number),
                 AfterWrite::Acknowledge(..) => {}
+                AfterWrite::Safe(number) => {
+                    self.inbox.undo(number);
+                    self.unwritten.keep(now, vec![self.keys.forget(Kind::Incoming, number)]);
+                    taken = true;
+                }
                 AfterWrite::Release(number) => {
-                    if let Some(left) = self.outbox.leave(number, true) {
+                    let is_definition = self.outbox.entry(number).is_some_and(|entry| entry.stream == 0);
+                    if is_definition {
+                        // Nobody else gives this name: it goes out when it is written after all.
+                        self.unwritten.release_later(after);
+                    } else if let Some(left) = self.outbox.leave(number, true) {
                         let reason = Reason::Journal(why.to_owned());
+                        self.unwritten.keep(now, vec![self.keys.forget(Kind::Outgoing, number)]);
                         self.tell(left.entry.ticket, TicketState::Refused(reason), effects);
                     }
                 }
             }
+        }
+        if taken {
+            self.unwritten.keep(now, vec![self.keys.put(Kind::Taken, 0, self.inbox.encode_taken())]);
         }
     }
 

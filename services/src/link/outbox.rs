@@ -78,6 +78,12 @@ impl Outbox {
         self.entries.len()
     }
 
+    /// How many commands there are but definitions, and their bytes.
+    pub(super) fn commands(&self) -> (usize, usize) {
+        let commands = self.entries.values().filter(|entry| entry.stream != 0);
+        commands.fold((0, 0), |(count, bytes), entry| (count + 1, bytes + entry.body.len()))
+    }
+
     /// Bytes of all commands that wait or are on the air.
     pub(super) fn bytes(&self) -> usize {
         self.bytes

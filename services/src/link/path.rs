@@ -78,6 +78,8 @@ pub(super) struct Acks {
     pub(super) due: Option<Monotonic>,
     /// How many more copies are to go.
     pub(super) copies: u32,
+    /// How long after one copy the next goes.
+    pub(super) apart: Duration,
     /// Frames taken since the last one.
     pub(super) taken: u32,
     /// When the newest frame in it came.

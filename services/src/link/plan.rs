@@ -1,5 +1,6 @@
 //! The budget dry run: what a load costs on a link before anything is sent, and what starves.
 
+use super::path::ACK_DELAY;
 use super::{CarrierConfig, Class, TAG_BYTES};
 use std::time::Duration;
 
@@ -65,27 +66,17 @@ pub fn plan(carrier: &CarrierConfig, keyed: bool, flows: &[Flow], back: &[Flow])
     let tag = if keyed { TAG_BYTES as f64 } else { 0.0 };
     let rate = carrier.rate as f64;
     let copies = command_copies(loss);
+    let room = carrier.mtu as f64 - PIECE_OVERHEAD - tag;
     let wanted = |flow: &Flow| {
         let bytes = flow.bytes as f64;
-        let room = carrier.mtu as f64 - PIECE_OVERHEAD - tag;
         let cost = match flow.class {
             Class::Command => copies * (bytes + COMMAND_OVERHEAD + tag),
-            // A lost sample is not sent again once a newer one is there.
-            Class::State => bytes + STATE_OVERHEAD + tag,
+            Class::State => state_copies(carrier, flow) * (bytes + STATE_OVERHEAD + tag),
             Class::Bulk => bytes / room * carrier.mtu as f64 / (1.0 - loss),
         };
         cost * flow.per_second
     };
-    let arriving = |flow: &Flow| {
-        let frames = match flow.class {
-            Class::Command => command_copies(loss) * (1.0 - loss) * if loss >= 0.08 { 2.0 } else { 1.0 },
-            Class::State => 0.5 * (1.0 - loss),
-            Class::Bulk => 0.5 * flow.bytes as f64 / (carrier.mtu as f64 - PIECE_OVERHEAD),
-        };
-        frames * flow.per_second * (ACK + tag)
-    };
-    let alive = (4e-5f64.ln() / (loss + 0.03).clamp(0.02, 0.8).ln()).ceil().max(3.0) / 9.5 * (ALIVE + tag);
-    let overhead = back.iter().map(arriving).sum::<f64>().min(rate / 4.0) + alive;
+    let overhead = overhead(carrier, tag, flows, back);
     let mut left = rate - overhead;
     let mut planned: Vec<FlowPlan> = Vec::new();
     for class in [Class::Command, Class::State, Class::Bulk] {
@@ -121,6 +112,44 @@ pub fn plan(carrier: &CarrierConfig, keyed: bool, flows: &[Flow], back: &[Flow])
         worst_command: Duration::from_secs_f64(worst),
         resync: Duration::from_secs_f64(resync),
     }
+}
+
+/// Bytes a second of acknowledgements for what comes from the other end, and of frames that keep alive where nothing else does.
+fn overhead(carrier: &CarrierConfig, tag: f64, flows: &[Flow], back: &[Flow]) -> f64 {
+    let loss = carrier.loss.clamp(0.0, 0.9);
+    let room = carrier.mtu as f64 - PIECE_OVERHEAD - tag;
+    // Frames a second with a kind of message, and with acknowledgements for it.
+    let frames = |flow: &Flow| {
+        let each = match flow.class {
+            Class::Command => command_copies(loss),
+            Class::State => state_copies(carrier, flow),
+            Class::Bulk => flow.bytes as f64 / room / (1.0 - loss),
+        };
+        each * flow.per_second
+    };
+    let answers = |flow: &Flow| {
+        let each = match flow.class {
+            Class::Command => command_copies(loss) * (1.0 - loss) * if loss >= 0.08 { 2.0 } else { 1.0 },
+            Class::State => 0.5 * (1.0 - loss),
+            Class::Bulk => 0.5 * flow.bytes as f64 / room,
+        };
+        each * flow.per_second
+    };
+    let answering = back.iter().map(answers).sum::<f64>();
+    let sending = flows.iter().map(frames).sum::<f64>() + answering;
+    let wanted = (4e-5f64.ln() / (loss + 0.03).clamp(0.02, 0.8).ln()).ceil().max(3.0) / 9.5;
+    let alive = (wanted - sending).max(0.0) * (ALIVE + tag);
+    (answering * (ACK + tag)).min(carrier.rate as f64 / 4.0) + alive
+}
+
+/// How many copies of a sample go out on average: a lost one goes again, unless a newer one is there before the loss is known.
+fn state_copies(carrier: &CarrierConfig, flow: &Flow) -> f64 {
+    let loss = carrier.loss.clamp(0.0, 0.9);
+    let known_after = carrier.round_trip.as_secs_f64() * 1.1
+        + carrier.mtu as f64 / carrier.rate as f64
+        + ACK_DELAY.as_secs_f64();
+    let turns = f64::from(flow.instances) / flow.per_second.max(1e-9) / known_after;
+    (0..16).map(|turn| loss.powi(turn) * (turns - f64::from(turn) + 1.0).clamp(0.0, 1.0)).sum()
 }
 
 /// How many copies of a command go out on average: one, and where no word comes, rounds of more.

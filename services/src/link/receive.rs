@@ -338,8 +338,9 @@ impl Link {
             let delay = (path.round_trip() / 6).min(ACK_DELAY);
             let more = path.acks.taken >= 2;
             path.owe(if more { now } else { now + delay });
-            // One that no further frame comes after is worth its copies.
+            // One that no further frame comes after is worth its copies: they wait for one, which has an acknowledgement of its own.
             path.acks.copies = if more { 1 } else { path.ack_copies() };
+            path.acks.apart = path.airtime(path.config.mtu * 5 / 4).min(delay * 3);
         }
     }
 
@@ -350,6 +351,7 @@ impl Link {
         path.received.acknowledge(number);
         path.acks.taken += 1;
         path.acks.copies = path.acks.copies.max(if fresh { path.ack_copies() } else { 1 });
+        path.acks.apart = Duration::ZERO;
         path.owe(now);
     }
 }

@@ -2,6 +2,7 @@
 
 use super::event::Record;
 use aldis_envelope::EntityId;
+use bytes::Bytes;
 
 /// What a record of a link holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -55,8 +56,8 @@ impl RecordKeys {
         Self { prefix: record_prefix(peer) }
     }
 
-    pub(super) fn key(&self, kind: Kind, number: u64) -> Vec<u8> {
-        [&self.prefix[..], &[kind as u8], &number.to_be_bytes()].concat()
+    pub(super) fn key(&self, kind: Kind, number: u64) -> Bytes {
+        [&self.prefix[..], &[kind as u8], &number.to_be_bytes()].concat().into()
     }
 
     pub(super) fn parse(&self, key: &[u8]) -> Option<(Kind, u64)> {
@@ -66,7 +67,7 @@ impl RecordKeys {
     }
 
     pub(super) fn put(&self, kind: Kind, number: u64, value: Vec<u8>) -> Record {
-        Record::Put { key: self.key(kind, number), value }
+        Record::Put { key: self.key(kind, number), value: value.into() }
     }
 
     pub(super) fn forget(&self, kind: Kind, number: u64) -> Record {

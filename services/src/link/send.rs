@@ -197,6 +197,7 @@ impl Link {
         let mut at = |moment: Option<Monotonic>| next = next.into_iter().chain(moment).min();
         at(self.outbox.next_expiry());
         at(self.states.deadline());
+        at(self.unwritten.due());
         at(self.silence_deadline());
         let idle = !self.is_due(now);
         for index in 0..self.paths.len() {

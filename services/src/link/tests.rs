@@ -15,7 +15,7 @@ struct End {
     delivered: Vec<Delivery>,
     tickets: Vec<(Ticket, TicketState)>,
     notes: Vec<String>,
-    journal: BTreeMap<Vec<u8>, Vec<u8>>,
+    journal: BTreeMap<Bytes, Bytes>,
 }
 
 fn entity(number: u64) -> EntityId {
@@ -39,7 +39,7 @@ fn now(milliseconds: u64) -> Now {
 }
 
 impl End {
-    fn new(config: LinkConfig, boot: u64, journal: BTreeMap<Vec<u8>, Vec<u8>>) -> Self {
+    fn new(config: LinkConfig, boot: u64, journal: BTreeMap<Bytes, Bytes>) -> Self {
         let carriers: Vec<_> = config.carriers.iter().map(|carrier| carrier.id).collect();
         let link = Link::new(config, BootId(boot));
         let (frames, delivered, tickets, notes) = Default::default();
@@ -390,4 +390,42 @@ proptest! {
         prop_assert!(b.frames.is_empty());
         prop_assert_eq!(b.link.counters().frames_received, received);
     }
+}
+
+/// What a link wants written because of an event, and what else it wants.
+fn persisted(end: &mut End, at: u64, event: Event) -> (Option<(BatchId, Vec<Record>)>, Vec<Effect>) {
+    let mut effects = Vec::new();
+    end.link.handle(now(at), &mut vec![event], &mut effects);
+    let batch = effects.iter().find_map(|effect| match effect {
+        Effect::Persist(batch, records) => Some((*batch, records.clone())),
+        _ => None,
+    });
+    (batch, effects)
+}
+
+#[test]
+fn of_what_the_journal_refuses_commands_are_told_and_names_are_written_later() {
+    let (mut a, _) = pair(1, &[]);
+    let offer = Offer::new(Ticket(5), envelope(7, b"take off"), Class::Command);
+    let (batch, _) = persisted(&mut a, 1_000, Event::Offer(offer));
+    let (batch, records) = batch.unwrap();
+    let (again, effects) = persisted(&mut a, 1_001, Event::WriteFailed(batch, "full".into()));
+    assert!(again.is_none(), "not at once");
+    let refused = |effect: &Effect| matches!(effect, Effect::Ticket(Ticket(5), TicketState::Refused(Reason::Journal(why))) if why == "full");
+    assert!(effects.iter().any(refused), "{effects:?}");
+    let (later, effects) = persisted(&mut a, 2_001, Event::Deadline);
+    let (second, later) = later.unwrap();
+    assert!(!effects.iter().any(|effect| matches!(effect, Effect::Ticket(..))));
+    // All keys are there again; of them the command alone is forgotten now.
+    let keys = |records: &[Record]| records.iter().map(|r| r.key().clone()).collect::<Vec<_>>();
+    let (mut before, mut after) = (keys(&records), keys(&later));
+    before.sort();
+    after.sort();
+    assert_eq!(before, after);
+    let forgotten = later.iter().filter(|record| matches!(record, Record::Forget { .. })).count();
+    assert_eq!(forgotten, 1);
+    // The names go out once they are written.
+    let (_, effects) = persisted(&mut a, 2_002, Event::Written(second));
+    assert!(effects.iter().any(|effect| matches!(effect, Effect::Transmit(..))), "{effects:?}");
+    assert_eq!(a.link.waiting().0, 2, "a label and an origin");
 }

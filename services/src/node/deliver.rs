@@ -54,7 +54,8 @@ impl Node {
                 via: Vec::new(),
             },
             Some(passed) => {
-                let Passed { source_time, lifespan_left_ms, priority, via } = *passed;
+                let Passed { delivery, source_time, lifespan_left_ms, priority, via } = *passed;
+                self.done_for_link(origin, delivery);
                 Stamp { node, boot, sequence, source_time, lifespan_left_ms, priority, skipped, via }
             }
         };

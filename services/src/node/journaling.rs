@@ -2,7 +2,7 @@
 //! before it hands it on, and tells what the journal refuses.
 
 use super::deliver::Kept;
-use super::keeping::{Held, OF_NODE, SAMPLES};
+use super::keeping::{Held, OF_LINKS, OF_NODE, SAMPLES};
 use super::{Node, Origin, Work};
 use crate::dds::{Durability, Record};
 use crate::event::{Effect, Event};
@@ -56,6 +56,19 @@ impl Journaling {
     /// A node that waits for its journal before it starts.
     fn awaited() -> Self {
         Self { stage: Stage::Opening, ..Self::default() }
+    }
+
+    /// Whether there is a journal.
+    pub(super) fn is_there(&self) -> bool {
+        !matches!(self.stage, Stage::None)
+    }
+
+    /// Why it keeps nothing, where it cannot be used.
+    pub(super) fn unusable(&self) -> Option<&Refused> {
+        match &self.stage {
+            Stage::Unusable(why) => Some(why),
+            _ => None,
+        }
     }
 
     /// Whether the node still waits for it.
@@ -112,10 +125,11 @@ impl Node {
     /// What the journal tells.
     pub(super) fn journal(&mut self, now: Now, event: JournalEvent, effects: &mut Vec<Effect>) {
         match event {
-            JournalEvent::Recovered { space, key, value } => self.read_back(space, &key, value),
+            JournalEvent::Recovered { space, key, value } => self.read_back(now, space, key, value),
             JournalEvent::RecoveredAll(recovered) => self.all_read_back(now, recovered, effects),
             JournalEvent::Written { up_to } => {
                 self.keeping.written(up_to);
+                self.links_written(up_to);
                 self.begun(now, up_to, effects);
                 self.hand_on_kept(now, effects);
                 self.journal_works(now);
@@ -134,10 +148,11 @@ impl Node {
         }
     }
 
-    fn read_back(&mut self, space: u8, key: &[u8], value: Bytes) {
-        match (space, key.try_into()) {
+    fn read_back(&mut self, now: Now, space: u8, key: Bytes, value: Bytes) {
+        match (space, key[..].try_into()) {
+            (OF_LINKS, _) => self.link_read_back(now, key, value),
             (SAMPLES, Ok(number)) => drop(self.journaling.records.insert(u64::from_be_bytes(number), value)),
-            (OF_NODE, _) if key == BEGUN => {
+            (OF_NODE, _) if key[..] == *BEGUN => {
                 self.journaling.begun = value[..].try_into().ok().map(u64::from_be_bytes);
             }
             _ => {}
@@ -203,7 +218,9 @@ impl Node {
         let place = self.label(&message.label);
         let entry = self.labels.entry(place);
         let qos = entry.qos.filter(|qos| qos.durability == Durability::Persistent);
-        let Some(qos) = qos.filter(|_| self.config.entities.contains(&message.label.source().entity)) else {
+        let source = message.label.source().entity;
+        let is_ours = self.config.entities.contains(&source) || self.links.is_behind(source);
+        let Some(qos) = qos.filter(|_| is_ours) else {
             // The configuration has changed: it is not to be kept any more.
             self.keeping.forgotten.push(number);
             return;
@@ -249,19 +266,27 @@ impl Node {
         let Some(value) = Record::encode(&work.message, now.wall) else {
             return self.hand_on(now, place, work, None, effects);
         };
-        let held = Held::new(now, work);
+        let mut held = Held::new(now, work);
+        // With its record the message is this node's own: the link is answered in the same batch. But a service here is to get it again
+        // after a crash, so that the link is answered with what the service says of it.
+        let is_for_services = !self.labels.entry(place).services.is_empty();
+        let passed = held.work.passed.as_mut().filter(|_| !is_for_services);
+        let delivery = passed.and_then(|passed| passed.delivery.take());
+        let origin = held.work.origin;
         let kept = match &self.journaling.stage {
             Stage::Unusable(why) => Err(Box::new((held, why.clone()))),
             _ => self.keeping.keep(held, value),
         };
-        if let Err(not_kept) = kept {
-            let (held, why) = *not_kept;
-            let is_of_journal = !matches!(why, Refused::Batch(_));
-            let origin = held.work.origin;
-            self.not_kept(now, held, &why, effects);
-            self.start_anew(now, origin, &why, effects);
-            if is_of_journal {
-                self.journal_fails(now, &why, effects);
+        match kept {
+            Ok(()) => self.done_for_link(origin, delivery),
+            Err(not_kept) => {
+                let (held, why) = *not_kept;
+                let is_of_journal = !matches!(why, Refused::Batch(_));
+                self.not_kept(now, held, &why, effects);
+                self.start_anew(now, origin, &why, effects);
+                if is_of_journal {
+                    self.journal_fails(now, &why, effects);
+                }
             }
         }
     }
@@ -289,6 +314,7 @@ impl Node {
             self.not_kept(now, held, why, effects);
             self.start_anew(now, origin, why, effects);
         }
+        self.links_refused(from, to, why);
         self.begun(now, to, effects);
         self.hand_on_kept(now, effects);
         self.journal_fails(now, why, effects);

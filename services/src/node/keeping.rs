@@ -8,6 +8,7 @@
 
 use super::{Origin, Work};
 use crate::journal::{BATCH_BYTES_MAX, Batch, RECORD_BYTES_MAX, Refused};
+use crate::link;
 use aldis_envelope::{Monotonic, Wall};
 use bytes::Bytes;
 use std::collections::{BTreeMap, VecDeque};
@@ -16,6 +17,10 @@ use std::collections::{BTreeMap, VecDeque};
 pub(super) const SAMPLES: u8 = 1;
 /// The space of what the node itself keeps.
 pub(super) const OF_NODE: u8 = 2;
+/// The space of what its links keep. The keys are theirs.
+pub(super) const OF_LINKS: u8 = 3;
+/// A batch that holds so much is closed at the next place where nothing is torn apart by it.
+const MUCH_BYTES: usize = 1 << 20;
 /// The most bytes on their way to the disk: what a journal lets wait.
 const BYTES_MAX: usize = 8 << 20;
 /// The most batches on their way to the disk.
@@ -63,6 +68,9 @@ struct OnItsWay {
 }
 
 /// Messages that wait for the disk, and what is to be told to it.
+///
+/// What one event brings about stands in one batch, what links keep and what services say: a service that answers a command of a link
+/// with a sample of a persistent topic has said it exactly once. Only where one event brings more than a mebibyte is it divided.
 #[derive(Default)]
 pub(super) struct Keeping {
     waiting: VecDeque<Held>,
@@ -137,6 +145,38 @@ impl Keeping {
     pub(super) fn keep_of_node(&mut self, key: &'static [u8], value: Vec<u8>) -> u64 {
         self.batch.put(OF_NODE, key, value);
         self.last_batch + 1
+    }
+
+    /// Brings what links keep to disk, as one with what services say in this turn. The number of its batch.
+    ///
+    /// # Errors
+    /// Why it cannot be kept.
+    pub(super) fn keep_of_links(&mut self, records: Vec<link::Record>) -> Result<u64, Refused> {
+        let bytes: usize = records.iter().map(|record| record.bytes() + OPERATION_BYTES).sum();
+        let pending = self.bytes + self.batch.encoded_bytes() + bytes;
+        if pending > BYTES_MAX || self.on_their_way.len() >= BATCHES_MAX {
+            return Err(Refused::Behind { pending });
+        }
+        if self.batch.encoded_bytes() + bytes > BATCH_BYTES_MAX {
+            self.close();
+        }
+        for record in records {
+            match record {
+                link::Record::Put { key, value } => self.batch.put(OF_LINKS, key, value),
+                link::Record::Forget { key } => self.batch.forget(OF_LINKS, key),
+            };
+        }
+        Ok(self.last_batch + 1)
+    }
+
+    /// Whether this turn brings so much to disk that it should be closed.
+    pub(super) fn has_much(&self) -> bool {
+        self.batch.encoded_bytes() > MUCH_BYTES
+    }
+
+    /// What more comes in this turn is another batch.
+    pub(super) fn close(&mut self) {
+        self.close_batch(Vec::new());
     }
 
     /// The batches of this turn, with their numbers. What is to be forgotten goes along, or alone where it is much or where

@@ -5,21 +5,20 @@
 
 mod answers;
 mod arrivals;
+mod keeping;
 mod services;
 mod tickets;
 
 use super::{Node, Origin};
 use crate::event::{Effect, LinkEvent, LinkId, Place};
-use crate::link::{
-    self, BatchId, CarrierId, Link, LinkSpec, Offer, Record, Ticket, TicketState, record_prefix,
-};
+use crate::link::{self, BatchId, CarrierId, Link, LinkSpec, Offer, Ticket, TicketState};
 use crate::service::Level;
 use aldis_envelope::umaa::{CommandKey, Key};
 use aldis_envelope::{
     Address, CallId, EntityId, Envelope, Fleet, GuidForm, Guids, Label, Message, Monotonic, Now, Prefix,
     Source,
 };
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
 /// How many calls are followed by their tickets. The callers of others hear nothing until the answer.
@@ -31,15 +30,14 @@ const EARLY_MAX: usize = 65_536;
 /// chance, and calls that are under way end when a token goes.
 const TOKENS_STAY: Duration = Duration::from_secs(20);
 
-/// What the links of one turn ask to be written: which link, its batch, its records.
-type Writes = Vec<(usize, BatchId, Vec<Record>)>;
-
 /// One link of the node.
 struct Attached {
     spec: LinkSpec,
     link: Link,
     /// What it is to be told in this turn.
     events: Vec<link::Event>,
+    /// What it wants done and is not done yet.
+    wishes: VecDeque<link::Effect>,
     /// What was offered before its journal was read back.
     early: Vec<Offer>,
     ready: bool,
@@ -71,8 +69,6 @@ struct Caller {
 pub(super) struct Links {
     all: Vec<Attached>,
     guids: [Guids; 2],
-    /// Whether the node has a journal.
-    journaled: bool,
     /// Some link has something to do.
     due: bool,
     /// The services here may have changed.
@@ -80,21 +76,17 @@ pub(super) struct Links {
     /// What the peers were last told of them.
     told: Vec<Source>,
     told_times: u64,
-    next_write: u64,
+    /// Batches on their way to the journal, by the journal's number.
     writes: BTreeMap<u64, Vec<(usize, BatchId)>>,
 }
 
 impl Links {
-    pub(super) fn new(
-        specs: &[LinkSpec],
-        journaled: bool,
-        boot: aldis_envelope::BootId,
-        fleet: &Fleet,
-    ) -> Self {
+    pub(super) fn new(specs: &[LinkSpec], boot: aldis_envelope::BootId, fleet: &Fleet) -> Self {
         let attach = |spec: &LinkSpec| Attached {
             link: Link::new(spec.link.clone(), boot),
             spec: spec.clone(),
             events: Vec::new(),
+            wishes: VecDeque::new(),
             early: Vec::new(),
             ready: false,
             armed: None,
@@ -108,12 +100,10 @@ impl Links {
         Self {
             all: specs.iter().map(attach).collect(),
             guids: [GuidForm::Readable, GuidForm::V5].map(|form| Guids::new(fleet, form)),
-            journaled,
             due: false,
             services_changed: !specs.is_empty(),
             told: Vec::new(),
             told_times: 0,
-            next_write: 1,
             writes: BTreeMap::new(),
         }
     }
@@ -174,18 +164,6 @@ impl Links {
 }
 
 impl Node {
-    pub(super) fn start_links(&mut self, now: Now, effects: &mut Vec<Effect>) {
-        if self.links.journaled {
-            return;
-        }
-        for place in 0..self.links.all.len() {
-            self.links.give(place, link::Event::ReadBackEnd);
-            let name = self.links.all[place].spec.name.clone();
-            let text = format!("{name}: without a journal, what waits to cross is lost when this node ends");
-            self.say(now, Level::Information, &text.clone(), text, effects);
-        }
-    }
-
     /// Something happened at a link.
     pub(super) fn link_event(&mut self, now: Now, id: LinkId, event: LinkEvent, effects: &mut Vec<Effect>) {
         let Some(attached) = self.links.all.get(id.0) else { return };
@@ -223,34 +201,6 @@ impl Node {
         if attached.link.counters().frames_received > before {
             attached.places.insert(carrier, place);
             effects.push(Effect::Found(id, carrier, place));
-        }
-    }
-
-    /// A record of the journal that belongs to a link.
-    pub(super) fn link_read_back(&mut self, record: Record) {
-        let Record::Put { key, value } = record else { return };
-        let of = |attached: &Attached| key.starts_with(&record_prefix(attached.spec.link.peer));
-        // What belongs to a link that is configured no more stays in the journal, in case it comes back.
-        if let Some(place) = self.links.all.iter().position(of) {
-            self.links.give(place, link::Event::ReadBack { key, value });
-        }
-    }
-
-    pub(super) fn link_read_back_end(&mut self) {
-        for place in 0..self.links.all.len() {
-            self.links.give(place, link::Event::ReadBackEnd);
-        }
-    }
-
-    pub(super) fn link_written(&mut self, number: u64, failed: Option<&str>) {
-        for (place, batch) in self.links.writes.remove(&number).unwrap_or_default() {
-            self.links.give(
-                place,
-                match failed {
-                    None => link::Event::Written(batch),
-                    Some(why) => link::Event::WriteFailed(batch, why.to_owned()),
-                },
-            );
         }
     }
 
@@ -298,65 +248,12 @@ impl Node {
         }
     }
 
-    /// Has the links do what is due, until none has anything to do. What they want written goes as one.
-    pub(super) fn run_links(&mut self, now: Now, effects: &mut Vec<Effect>) {
-        self.tell_services(now);
-        while std::mem::take(&mut self.links.due) {
-            let mut writes = Writes::new();
-            while let Some(place) = self.links.all.iter().position(|link| !link.events.is_empty()) {
-                self.run_link(now, place, &mut writes, effects);
-            }
-            self.write(writes, effects);
-        }
-    }
-
-    fn write(&mut self, writes: Writes, effects: &mut Vec<Effect>) {
-        if writes.is_empty() {
-            return;
-        }
-        let number = self.links.next_write;
-        self.links.next_write += 1;
-        let batches = writes.iter().map(|(place, batch, _)| (*place, *batch)).collect();
-        self.links.writes.insert(number, batches);
-        if self.links.journaled {
-            let records = writes.into_iter().flat_map(|(_, _, records)| records).collect();
-            effects.push(Effect::Persist(number, records));
-        } else {
-            self.link_written(number, None);
-        }
-    }
-
-    fn run_link(&mut self, now: Now, place: usize, writes: &mut Writes, effects: &mut Vec<Effect>) {
-        let attached = &mut self.links.all[place];
-        let mut events = std::mem::take(&mut attached.events);
-        let is_ready = events.iter().any(|event| matches!(event, link::Event::ReadBackEnd));
-        let mut wishes = Vec::new();
-        attached.link.handle(now, &mut events, &mut wishes);
-        if is_ready {
-            attached.ready = true;
-            attached.next_ticket = attached.next_ticket.max(attached.link.largest_ticket().0 + 1);
-            let early = std::mem::take(&mut attached.early);
-            attached.events.extend(early.into_iter().map(link::Event::Offer));
-            self.links.due = true;
-        }
-        for wish in wishes {
-            self.carry_out_for_link(now, place, wish, writes, effects);
-        }
-    }
-
-    fn carry_out_for_link(
-        &mut self,
-        now: Now,
-        place: usize,
-        wish: link::Effect,
-        writes: &mut Writes,
-        effects: &mut Vec<Effect>,
-    ) {
+    fn carry_out_for_link(&mut self, now: Now, place: usize, wish: link::Effect, effects: &mut Vec<Effect>) {
         match wish {
             link::Effect::Transmit(carrier, frame) => {
                 effects.push(Effect::Transmit(LinkId(place), carrier, frame));
             }
-            link::Effect::Persist(batch, records) => writes.push((place, batch, records)),
+            link::Effect::Persist(batch, records) => self.write_for_link(place, batch, records),
             link::Effect::Deliver(delivery) => self.arrived_by_link(now, place, delivery, effects),
             link::Effect::Ticket(ticket, state) => self.link_ticket(now, place, ticket, state, effects),
             link::Effect::Peer(heard) => self.link_peer(now, place, heard, effects),

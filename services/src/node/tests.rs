@@ -100,7 +100,6 @@ fn config(entities: &[u64], services: Vec<ServiceSpec>) -> NodeConfig {
         services: all,
         bridges: Vec::new(),
         links: Vec::new(),
-        journaled: false,
     }
 }
 

@@ -124,7 +124,6 @@ impl Workload for Chatter {
                 services,
                 bridges: Vec::new(),
                 links: Vec::new(),
-                journaled: false,
             }
         };
         entities.iter().map(node).collect()

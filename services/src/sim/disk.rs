@@ -35,6 +35,8 @@ pub struct DiskFaults {
     pub write_fails: f64,
     /// Reads that fail.
     pub read_fails: f64,
+    /// Syncs that are told as done and are not: no program can do anything about such a disk. For those who check the checks.
+    pub syncs_lie: f64,
 }
 
 /// A directory on a simulated disk.
@@ -93,6 +95,9 @@ impl SimDisk {
                 if random.f64() < self.faults.sync_fails {
                     file.changes.clear();
                     return Err(failed("sync"));
+                }
+                if self.faults.syncs_lie > 0.0 && random.f64() < self.faults.syncs_lie {
+                    return Ok(DiskDone::Done);
                 }
                 for change in file.changes.drain(..) {
                     apply(&mut file.durable, &change);

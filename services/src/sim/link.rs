@@ -1,7 +1,7 @@
 //! The lossy link in virtual time: an emulator of bad links, machines with journals that crash, and the measure of the protocol.
 
 mod bench;
-mod crash;
+mod curves;
 mod disk;
 mod emulator;
 mod hostile;
@@ -11,7 +11,7 @@ mod swarm;
 mod world;
 
 pub use bench::{Bench, Row, bench, row_names};
-pub use crash::{CrashReport, crash};
+pub use curves::{Chart, curves};
 pub use disk::Disk;
 pub use emulator::{Burst, Profile, Way};
 pub use hostile::{HostileReport, hostile};

@@ -126,7 +126,6 @@ impl Offline {
             services: specs,
             bridges: Vec::new(),
             links: Vec::new(),
-            journaled: false,
         })?;
         let mut offline = Self { node, now: Monotonic::START, armed: None, queue, heard, notes: Vec::new() };
         offline.handle(Vec::new());

@@ -85,7 +85,7 @@ impl Options {
             disk: DiskFaults {
                 sync_fails: draw.share(0.001, 0.1),
                 write_fails: draw.share(0.001, 0.1),
-                read_fails: 0.0,
+                ..DiskFaults::default()
             },
             sample_loss: draw.share(0.0001, 0.05),
             reordering: 0.0,

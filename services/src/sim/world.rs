@@ -321,7 +321,6 @@ impl World {
             Effect::Exit => machine.exited = true,
             Effect::Say(note) => self.observe(place, Seen::Said(&note)),
             Effect::Transmit(link, carrier, frame) => self.transmit(place, link, carrier, frame),
-            Effect::Persist(number, records) => self.persist(place, number, records),
             Effect::PauseInput(_) | Effect::Found(..) => {}
         }
     }

@@ -6,6 +6,7 @@ mod access;
 mod allocation;
 mod calls;
 mod contention;
+mod custody;
 mod foreign;
 mod journal;
 mod link;

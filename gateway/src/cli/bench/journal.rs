@@ -2,7 +2,7 @@
 
 mod peer;
 
-pub(super) use peer::JournalPeer;
+pub(super) use peer::{JournalPeer, resident_kib};
 
 use super::super::exit::Failure;
 use super::super::print_line;
@@ -44,7 +44,7 @@ pub(super) struct JournalBench {
 }
 
 /// A directory that goes with the measurement.
-struct Scratch(PathBuf);
+pub(super) struct Scratch(pub(super) PathBuf);
 
 impl Drop for Scratch {
     fn drop(&mut self) {
@@ -53,7 +53,7 @@ impl Drop for Scratch {
     }
 }
 
-fn failed(why: impl std::fmt::Display) -> Failure {
+pub(super) fn failed(why: impl std::fmt::Display) -> Failure {
     Failure::Failed(why.to_string())
 }
 

@@ -1,11 +1,16 @@
 //! `aldis bench link`: the table of goals of the lossy link.
 
+mod charts;
+mod plain;
+mod real;
+
 use super::super::exit::Failure;
 use super::super::link::profile;
 use super::super::print_line;
 use aldis_services::sim::link::{Bench, Row, bench, row_names};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
@@ -30,6 +35,21 @@ pub(super) struct LinkBench {
     /// These rows alone: `--only G1,G5`.
     #[arg(long, value_delimiter = ',')]
     only: Vec<String>,
+    /// Real processes through a relay of datagrams, in real time, instead of the table.
+    #[arg(long, conflicts_with_all = ["keys", "part", "only", "curves"])]
+    real: bool,
+    /// With `--real`: for so many seconds, and a minute at the most for what is under way.
+    #[arg(long, default_value_t = 60, requires = "real")]
+    seconds: u64,
+    /// With `--real`: commands a second.
+    #[arg(long, default_value_t = 2.0, requires = "real")]
+    rate: f64,
+    /// With `--real`: the same load over plain Zenoh too, through the same relay: `zenoh-udp`.
+    #[arg(long, requires = "real")]
+    against: Option<String>,
+    /// Delivery, latency and bytes against loss and rate, as SVG files in this directory, instead of the table.
+    #[arg(long, value_name = "DIRECTORY")]
+    curves: Option<PathBuf>,
     /// One JSON object with a field for each row.
     #[arg(long)]
     json: bool,
@@ -40,6 +60,15 @@ impl LinkBench {
         let profile = profile(&self.profile)?;
         if !(self.part > 0.0 && self.part <= 1.0) {
             return Err(Failure::Usage(format!("--part {}: a number above 0, at most 1", self.part)));
+        }
+        if self.real {
+            return self.real(profile);
+        }
+        if let Some(directory) = &self.curves {
+            let count = (2_000.0 * self.part).max(20.0) as u64;
+            let files = charts::write(&profile, count, self.seed, directory)?;
+            files.iter().for_each(|file| print_line(file.display()));
+            return Ok(());
         }
         let known = row_names(&profile);
         let is_known = |name: &String| known.iter().any(|known| known.eq_ignore_ascii_case(name));
@@ -82,6 +111,16 @@ impl LinkBench {
             }
             print_line(Value::Object(object));
         }
+        Ok(())
+    }
+
+    fn real(self, profile: aldis_services::sim::link::Profile) -> Result<(), Failure> {
+        if !(self.rate > 0.0 && self.rate <= 1_000.0) {
+            return Err(Failure::Usage(format!("--rate {}: a number above 0, at most 1000", self.rate)));
+        }
+        let (seconds, rate, seed) = (self.seconds, self.rate, self.seed);
+        let result = real::Real { profile, seconds, rate, seed }.run(self.against.as_deref())?;
+        print_line(if self.json { result.to_string() } else { format!("{result:#}") });
         Ok(())
     }
 

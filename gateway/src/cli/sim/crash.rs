@@ -2,7 +2,7 @@
 
 use crate::cli::exit::Failure;
 use crate::cli::print_line;
-use aldis_services::sim::link;
+use aldis_services::sim::custody::{self, CrashReport};
 use serde_json::json;
 use std::time::Instant;
 
@@ -24,12 +24,12 @@ pub(super) struct SimCrash {
 impl SimCrash {
     pub(super) fn run(self) -> Result<(), Failure> {
         let start = Instant::now();
-        let report = link::crash(self.points, self.seed);
-        let link::CrashReport { points, during_a_write, accepted, lost, twice } = report;
+        let report = custody::crash(self.points, self.seed).map_err(Failure::Failed)?;
+        let CrashReport { points, during_a_write, power_losses, accepted, lost, twice } = report;
         let seconds = start.elapsed().as_secs_f64();
         if self.json {
             print_line(json!({
-                "points": points, "during_a_write": during_a_write, "accepted": accepted, "lost": lost, "twice": twice,
+                "points": points, "during_a_write": during_a_write, "power_losses": power_losses, "accepted": accepted, "lost": lost, "twice": twice,
                 "seed": self.seed, "seconds": (seconds * 10.0).round() / 10.0,
             }));
         } else {

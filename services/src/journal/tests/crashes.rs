@@ -196,7 +196,7 @@ fn nothing_acknowledged_is_lost_and_nothing_comes_back() {
 
 #[test]
 fn a_disk_that_fails_costs_nothing_that_was_acknowledged() {
-    let faults = DiskFaults { sync_fails: 0.05, write_fails: 0.05, read_fails: 0.0 };
+    let faults = DiskFaults { sync_fails: 0.05, write_fails: 0.05, ..DiskFaults::default() };
     let (mut written, mut refused) = (0, 0);
     for seed in seeds() {
         let (model, _) = lives(seed + 1_000_000, 12, faults, None);

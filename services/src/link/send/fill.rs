@@ -131,7 +131,7 @@ impl Link {
             load.push(Chosen::Ack { largest, delay, before }, bytes, None);
             path.acks.taken = 0;
             path.acks.copies -= 1;
-            path.acks.due = (path.acks.copies > 0).then_some(now);
+            path.acks.due = (path.acks.copies > 0).then_some(now + path.acks.apart);
         }
         if !data && let Some(loss) = path.loss_to_tell(now) {
             load.push(Chosen::Loss(loss), 2, None);

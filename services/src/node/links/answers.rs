@@ -43,7 +43,7 @@ impl Node {
     }
 
     fn link_statuses(&self, now: Now) -> Bytes {
-        aldis::encode(&self.links.statuses(now.monotonic)).into()
+        aldis::encode(&self.links.statuses(now.monotonic, self.journaling.is_there())).into()
     }
 
     fn queued(&self, now: Now, asked: &told::QueueQuery) -> Vec<told::QueuedCommand> {
@@ -66,13 +66,21 @@ impl Node {
     }
 }
 
+impl Node {
+    /// How many commands wait to cross the links of this node, and their bytes.
+    pub fn queued_commands(&self) -> (usize, usize) {
+        let links = self.links.all.iter().map(|attached| attached.link.commands());
+        links.fold((0, 0), |(count, bytes), (more, of_them)| (count + more, bytes + of_them))
+    }
+}
+
 /// The status of every link, filled in with what the node knows.
 impl Links {
-    fn statuses(&self, now: Monotonic) -> Vec<told::LinkStatus> {
+    fn statuses(&self, now: Monotonic, durable: bool) -> Vec<told::LinkStatus> {
         let status = |attached: &Attached| told::LinkStatus {
             name: attached.spec.name.clone(),
             behind: attached.spec.export.behind.iter().copied().collect(),
-            durable: self.journaled,
+            durable,
             services: attached.services.iter().copied().collect(),
             ..attached.link.status(now)
         };

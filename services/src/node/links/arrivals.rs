@@ -2,13 +2,13 @@
 
 use super::super::{Node, Origin, Passed, Work};
 use crate::event::{Effect, LinkId};
-use crate::link::{self, Delivery};
+use crate::link::{self, Delivery, DeliveryId};
 use crate::service::Level;
 use aldis_envelope::aldis::link as told;
 use aldis_envelope::{ContentType, Envelope, Now, Role};
 
 impl Node {
-    /// A message came by a link. Its number is given back in the same turn, so that what comes of it is written with that.
+    /// A message came by a link. Its number is given back when it is handed on, so that what comes of it is written with that.
     pub(super) fn arrived_by_link(
         &mut self,
         now: Now,
@@ -20,8 +20,10 @@ impl Node {
         let label = &envelope.message.label;
         let source = label.source();
         let attached = &self.links.all[place];
+        let origin = Origin::Link(LinkId(place));
         if label.attributes.content_type == ContentType::Aldis && label.descriptor() == told::SERVICES {
             self.services_told(now, place, &envelope, effects);
+            self.done_for_link(origin, id);
         } else if !attached.spec.export.behind.contains(&source.entity) {
             let text = format!(
                 "{}: a message of {source} is refused: {} is not among the entities behind this link",
@@ -29,17 +31,29 @@ impl Node {
             );
             self.counters.refused_links += 1;
             self.say(now, Level::Warning, "refused at a link", text, effects);
+            self.done_for_link(origin, id);
         } else {
             self.counters.imported_by_links += 1;
-            self.import_by_link(now, place, envelope, effects);
+            self.import_by_link(now, place, id, envelope, effects);
             self.settle(now, effects);
         }
-        if let Some(delivery) = id {
+    }
+
+    /// A message that came by a link is handed on, or safe here.
+    pub(in crate::node) fn done_for_link(&mut self, origin: Origin, delivery: Option<DeliveryId>) {
+        if let (Origin::Link(LinkId(place)), Some(delivery)) = (origin, delivery) {
             self.links.give(place, link::Event::Done { delivery, with: Vec::new() });
         }
     }
 
-    fn import_by_link(&mut self, now: Now, place: usize, envelope: Envelope, effects: &mut Vec<Effect>) {
+    fn import_by_link(
+        &mut self,
+        now: Now,
+        place: usize,
+        delivery: Option<DeliveryId>,
+        envelope: Envelope,
+        effects: &mut Vec<Effect>,
+    ) {
         let Envelope { mut message, stamp } = envelope;
         if let Some(call) = &mut message.call
             && let Role::Request { time_left_ms } = &mut call.role
@@ -50,6 +64,7 @@ impl Node {
         let mut via = stamp.via;
         via.push(stamp.node);
         let passed = Passed {
+            delivery,
             source_time: stamp.source_time,
             lifespan_left_ms: stamp.lifespan_left_ms,
             priority: stamp.priority,

@@ -244,7 +244,7 @@ fn last_of_each(heard: &Seen) -> BTreeMap<u64, Said> {
 fn whatever_was_heard_outlives_every_crash() {
     for seed in 0..25 {
         crashes(seed, DiskFaults::default());
-        crashes(seed, DiskFaults { sync_fails: 0.1, write_fails: 0.1, read_fails: 0.0 });
+        crashes(seed, DiskFaults { sync_fails: 0.1, write_fails: 0.1, ..DiskFaults::default() });
     }
 }
 

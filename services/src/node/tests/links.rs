@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::event::LinkId;
+use crate::journal::JournalConfig;
 use crate::link::export::{Export, Rule};
 use crate::link::{CarrierConfig, CarrierId, Class, LinkConfig, LinkSpec};
 use crate::sim::link::Profile;
@@ -198,10 +199,13 @@ fn what_is_accepted_survives_both_ends() {
     let mut world = world();
     let mut shore = linked(&[1], vec![sender], vec![spec(1, 400, &[400], rules())]);
     shore.bridges.push(bridge(1));
-    shore.journaled = true;
-    let shore = world.add(shore).unwrap();
+    let journal = || JournalConfig { segment_bytes: 1 << 14, ..JournalConfig::new(7) };
+    let latency = (MILLISECOND, 3 * MILLISECOND);
+    let shore = world.add_with_journal(shore, journal(), latency).unwrap();
     let vehicle = linked(&[400], vec![receiver], vec![spec(400, 1, &[1], rules())]);
-    let vehicle = world.add(NodeConfig { journaled: true, ..vehicle }).unwrap();
+    let vehicle = world.add_with_journal(vehicle, journal(), latency).unwrap();
+    world.restart(shore);
+    world.restart(vehicle);
     world.partition(&[0, 1], Duration::ZERO);
     world.join((shore, LinkId(0)), (vehicle, LinkId(0)), CARRIER, &Profile::L1);
     world.run_for(Duration::from_secs(20));
@@ -210,8 +214,8 @@ fn what_is_accepted_survives_both_ends() {
         say(&mut world, shore, &format!("400 {session} put"));
     }
     world.run_for(Duration::from_secs(1));
-    world.crash(shore, false, Duration::ZERO);
-    world.crash(vehicle, false, Duration::ZERO);
+    world.crash(shore, true, Duration::ZERO);
+    world.crash(vehicle, true, Duration::ZERO);
     world.restart(shore);
     world.restart(vehicle);
     world.cut(vehicle, false);

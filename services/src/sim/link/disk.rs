@@ -1,17 +1,18 @@
 //! A journal that crashes: only what was acknowledged as written is sure to survive, and nothing survives in part.
 
 use crate::link::Record;
+use bytes::Bytes;
 use std::collections::{BTreeMap, VecDeque};
 
 /// A journal and what is on its way into it.
 #[derive(Debug, Clone, Default)]
 pub struct Disk {
-    written: BTreeMap<Vec<u8>, Vec<u8>>,
+    written: BTreeMap<Bytes, Bytes>,
     pending: VecDeque<(u64, Vec<Record>)>,
     next: u64,
 }
 
-fn apply(written: &mut BTreeMap<Vec<u8>, Vec<u8>>, records: Vec<Record>) {
+fn apply(written: &mut BTreeMap<Bytes, Bytes>, records: Vec<Record>) {
     for record in records {
         match record {
             Record::Put { key, value } => {
@@ -56,8 +57,11 @@ impl Disk {
     }
 
     /// Everything under keys that begin so.
-    pub fn read(&self, prefix: &[u8]) -> Vec<(Vec<u8>, Vec<u8>)> {
-        let all = self.written.range(prefix.to_vec()..).take_while(|(key, _)| key.starts_with(prefix));
+    pub fn read(&self, prefix: &[u8]) -> Vec<(Bytes, Bytes)> {
+        let all = self
+            .written
+            .range(Bytes::copy_from_slice(prefix)..)
+            .take_while(|(key, _)| key.starts_with(prefix));
         all.map(|(key, value)| (key.clone(), value.clone())).collect()
     }
 
@@ -75,13 +79,14 @@ mod tests {
     #[test]
     fn what_is_finished_survives_and_what_is_torn_does_not() {
         let mut disk = Disk::default();
-        let put = |key: u8| vec![Record::Put { key: vec![1, key], value: vec![key] }];
+        let put = |key: u8| vec![Record::Put { key: vec![1, key].into(), value: vec![key].into() }];
         let first = disk.begin(put(1));
         disk.finish(first);
         disk.begin(put(2));
-        disk.begin(vec![Record::Forget { key: vec![1, 1] }]);
+        disk.begin(vec![Record::Forget { key: vec![1, 1].into() }]);
         disk.crash(1);
-        assert_eq!(disk.read(&[1]), [(vec![1, 1], vec![1]), (vec![1, 2], vec![2])]);
+        let bytes = |bytes: &'static [u8]| Bytes::from_static(bytes);
+        assert_eq!(disk.read(&[1]), [(bytes(&[1, 1]), bytes(&[1])), (bytes(&[1, 2]), bytes(&[2]))]);
         assert_eq!((disk.pending(), disk.read(&[2]).len()), (0, 0));
     }
 }

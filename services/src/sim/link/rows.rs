@@ -1,10 +1,12 @@
 //! One function for each row of the table of goals.
 
 mod commands;
+mod forecast;
 mod lower;
 mod pace;
 
 pub(super) use commands::{after_outage, exactly_once, latency, refused, through_shore};
+pub(super) use forecast::{Forecast, forecasts};
 pub(super) use lower::{bulk, overload, resync};
 pub(super) use pace::{budget, idle, queueing};
 

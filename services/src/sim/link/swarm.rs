@@ -276,7 +276,8 @@ impl Run {
         match state {
             TicketState::Accepted { .. } | TicketState::OnAir { .. } => {}
             TicketState::Delivered { .. } => known.last_word = Some((at, true)),
-            _ => known.last_word = Some((at, false)),
+            // A machine that dies before it has forgotten a command tells the same once more in its next life.
+            _ => known.last_word = known.last_word.or(Some((at, false))),
         }
     }
 

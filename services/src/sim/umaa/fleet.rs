@@ -316,7 +316,6 @@ impl Workload for UmaaFleet {
                 services,
                 bridges: Vec::new(),
                 links: Vec::new(),
-                journaled: false,
             }
         };
         arrangement.entities.iter().map(node).collect()

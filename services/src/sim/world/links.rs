@@ -1,22 +1,17 @@
-//! Bad links between machines of a world, and what their nodes keep for them.
+//! Bad links between machines of a world.
 
 use super::{Arrival, NodeHandle, World};
 use crate::event::{Event, LinkEvent, LinkId, Place};
-use crate::link::{CarrierId, Record};
-use crate::sim::link::{Disk, Profile, Way};
+use crate::link::CarrierId;
+use crate::sim::link::{Profile, Way};
 use aldis_envelope::Monotonic;
 use bytes::Bytes;
 use std::collections::BTreeMap;
-use std::time::Duration;
-
-/// How long a write takes.
-const WRITE_TIME: Duration = Duration::from_millis(2);
 
 /// The links of a world, by the end that sends: machine, link, carrier.
 #[derive(Debug, Default)]
 pub(super) struct Links {
     ways: BTreeMap<(usize, LinkId, CarrierId), (usize, LinkId, Way)>,
-    disks: BTreeMap<usize, Disk>,
     bytes: BTreeMap<(usize, LinkId), u64>,
 }
 
@@ -52,14 +47,8 @@ impl World {
         self.links.bytes.get(&(node.0, link)).copied().unwrap_or(0)
     }
 
-    /// A node begins a life: its carriers are there, and what its links kept is told.
+    /// A node begins a life: its carriers are there.
     pub(super) fn open_links(&mut self, place: usize) {
-        if self.machines[place].config.journaled {
-            let kept = self.links.disks.entry(place).or_default().read(b"L").into_iter();
-            let records = kept.map(|(key, value)| Event::ReadBack(Record::Put { key, value }));
-            let events = records.chain([Event::ReadBackEnd]).collect();
-            self.handle(place, events);
-        }
         let ends = self.links.ways.iter().filter(|((from, ..), _)| *from == place);
         let events = ends.map(|((_, link, carrier), (.., way))| {
             Event::Link(*link, LinkEvent::Up(*carrier, way.profile().mtu))
@@ -78,13 +67,5 @@ impl World {
             let event = LinkEvent::Frame(carrier, Place(place as u64), frame.clone());
             self.put(at, to, Arrival::Event(Event::Link(their, event)));
         }
-    }
-
-    pub(super) fn persist(&mut self, place: usize, number: u64, records: Vec<Record>) {
-        // What is on its way when the machine ends is written all the same: torn writes are the business of `sim::link`.
-        let disk = self.links.disks.entry(place).or_default();
-        let write = disk.begin(records);
-        disk.finish(write);
-        self.put(self.now + WRITE_TIME, place, Arrival::Event(Event::Persisted(number)));
     }
 }

@@ -50,6 +50,11 @@ impl World {
         }
     }
 
+    /// Whether a machine's disk is doing something.
+    pub fn disk_is_busy(&self, of: NodeHandle) -> bool {
+        self.machines[of.0].storage.as_ref().is_some_and(|storage| storage.under_way.is_some())
+    }
+
     /// Reads the journal of a machine back. False where it has none.
     pub(super) fn open_journal(&mut self, place: usize) -> bool {
         let Some(storage) = &mut self.machines[place].storage else { return false };

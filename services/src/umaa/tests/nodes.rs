@@ -37,7 +37,6 @@ fn node(entity: EntityId, services: Vec<ServiceSpec>) -> NodeConfig {
         services: all,
         bridges: Vec::new(),
         links: Vec::new(),
-        journaled: false,
     }
 }
 

@@ -54,7 +54,7 @@ fn write(mut told: Told, first: u32) -> Result<(), Failure> {
 }
 
 /// The memory of this process that is in use, in KiB; zero where the system does not tell.
-fn resident_kib() -> u64 {
+pub(in super::super) fn resident_kib() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap_or_default();
     line.trim().trim_end_matches(" kB").parse().unwrap_or_default()

@@ -91,8 +91,8 @@ impl LinkWorld {
             let times = machine.handled.entry(content.clone()).or_default();
             *times += 1;
             with.push(Record::Put {
-                key: [b"S", &content[..]].concat(),
-                value: times.to_be_bytes().to_vec(),
+                key: [b"S", &content[..]].concat().into(),
+                value: times.to_be_bytes().to_vec().into(),
             });
         }
         self.seen.push(Seen { at: self.now, port, what: What::Delivered(delivery) });
