@@ -425,7 +425,8 @@ fn of_what_the_journal_refuses_commands_are_told_and_names_are_written_later() {
     let forgotten = later.iter().filter(|record| matches!(record, Record::Forget { .. })).count();
     assert_eq!(forgotten, 1);
     // The names go out once they are written.
-    let (_, effects) = persisted(&mut a, 2_002, Event::Written(second));
-    assert!(effects.iter().any(|effect| matches!(effect, Effect::Transmit(..))), "{effects:?}");
     assert_eq!(a.link.waiting().0, 2, "a label and an origin");
+    persisted(&mut a, 2_002, Event::Written(second));
+    let (_, effects) = persisted(&mut a, 2_500, Event::Deadline);
+    assert!(effects.iter().any(|effect| matches!(effect, Effect::Transmit(..))), "{effects:?}");
 }

@@ -33,11 +33,13 @@ fn refusal(against: &str) -> Option<&'static str> {
     }
 }
 
-/// Measures plain Zenoh.
-pub(super) fn run(real: &Real, against: &str) -> Result<Value, Failure> {
-    if let Some(why) = refusal(against) {
-        return Err(Failure::Usage(format!("--against {against}: {why}")));
-    }
+/// Whether a kind of plain Zenoh can be measured here.
+pub(super) fn check(against: &str) -> Result<(), Failure> {
+    refusal(against).map_or(Ok(()), |why| Err(Failure::Usage(format!("--against {against}: {why}"))))
+}
+
+/// Measures plain Zenoh over UDP.
+pub(super) fn run(real: &Real) -> Result<Value, Failure> {
     let listen: SocketAddr = free_address()?;
     let (relay, passed) = relay(real, MTU, listen)?;
     let far = open(&format!("mode = \"peer\"\nlisten = [\"udp/{listen}\"]"))?;

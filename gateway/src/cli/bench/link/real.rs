@@ -137,12 +137,13 @@ impl Real {
 
     /// The same load over our link, and over plain Zenoh where that is asked for.
     pub(super) fn run(&self, against: Option<&str>) -> Result<Value, Failure> {
+        against.map_or(Ok(()), plain::check)?;
         let mut result = json!({
             "profile": self.profile.name, "seconds": self.seconds, "rate": self.rate, "seed": self.seed,
             "aldis": self.aldis()?,
         });
         if let Some(against) = against {
-            result[against] = plain::run(self, against)?;
+            result[against] = plain::run(self)?;
         }
         Ok(result)
     }
