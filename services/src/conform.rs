@@ -50,6 +50,8 @@ pub struct Bounds {
     /// How much later than the truth an observation of one writer may come beside those of another. Zero in a simulation
     /// that is watched at its source.
     pub slack: Duration,
+    /// How much later than it is decided something may be written, because it waits for a disk first.
+    pub written: Duration,
     /// How long a participant may go by what it has not heard yet, because a link is silent or a machine stands still.
     pub unheard: Duration,
 }
@@ -62,6 +64,7 @@ impl Default for Bounds {
             clean_up: 10 * second,
             follow: 10 * second,
             slack: Duration::ZERO,
+            written: Duration::ZERO,
             unheard: Duration::ZERO,
         }
     }

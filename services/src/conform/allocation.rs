@@ -37,7 +37,8 @@ impl Former {
     /// Whether a provider may still go by it: the change is not confirmed, and not too long ago for that to matter.
     fn may_be_believed(&self, now: Monotonic, bounds: Bounds) -> bool {
         match self.confirmed {
-            Some(confirmed) => now - confirmed < bounds.slack,
+            // What was decided before that may be written after it.
+            Some(confirmed) => now - confirmed < bounds.slack + bounds.written,
             None => now - self.since < bounds.slack + bounds.follow,
         }
     }

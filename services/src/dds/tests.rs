@@ -298,7 +298,7 @@ fn one_confirmation_speaks_for_many_samples_unless_their_writer_asks() {
         confirms.into_iter().flat_map(|(_, confirm)| confirm.upto).map(|(_, upto)| upto).collect::<Vec<_>>()
     };
     hear(&mut reading, now, &samples[..3]);
-    assert!(upto(reading.confirmations(now, true)).is_empty());
+    assert!(reading.confirmations(now, true).is_empty());
     let due = reading.next_deadline().unwrap();
     assert_eq!(upto(reading.confirmations(due, true)), [3]);
     let ends = [(writers::name_of(&samples[3]).unwrap(), 4)];

@@ -41,9 +41,10 @@ pub(super) fn topics() -> impl Iterator<Item = TopicInfo> {
 fn bounds(options: &Options) -> Bounds {
     let faults = &options.faults;
     // What one says is on its way to the disk and to the other, and an answer to what was before on its way back.
-    let unheard = 4 * options.delay.1 + 8 * options.disk_latency.1;
+    let written = 8 * options.disk_latency.1;
+    let unheard = 4 * options.delay.1 + written;
     // Commands here run for seconds, and what does not follow within them would never be missed.
-    let usual = Bounds { unheard, follow: Duration::from_secs(2), ..Bounds::default() };
+    let usual = Bounds { unheard, written, follow: Duration::from_secs(2), ..Bounds::default() };
     let some = [faults.session_drops, faults.partitions, faults.crashes, faults.stalls];
     if some.iter().all(Option::is_none) && faults.sample_loss == 0.0 {
         return usual;
