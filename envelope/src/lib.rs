@@ -7,6 +7,7 @@ pub mod aldis;
 pub mod call;
 pub mod change;
 pub mod codec;
+pub mod description;
 pub mod guid;
 pub mod id;
 pub mod key;
