@@ -10,6 +10,7 @@ pub mod codec;
 pub mod description;
 pub mod guid;
 pub mod id;
+pub mod idl;
 pub mod key;
 pub mod lmcp;
 pub mod message;

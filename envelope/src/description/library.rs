@@ -54,6 +54,11 @@ impl Library {
         self.definitions.get(name)
     }
 
+    /// The definition of a name, with the name as it is kept here.
+    pub fn entry(&self, name: &str) -> Option<(&str, &Definition)> {
+        self.definitions.get_key_value(name).map(|(name, definition)| (name.as_str(), definition))
+    }
+
     /// All definitions by their names.
     pub fn definitions(&self) -> impl Iterator<Item = (&str, &Definition)> {
         self.definitions.iter().map(|(name, definition)| (name.as_str(), definition))
