@@ -3,10 +3,11 @@
 use super::topic::malformed;
 use super::version::{Lost, Sample, Translator};
 use super::{ExportError, Given, ImportError, Imported, Taken, TopicMap};
-use aldis_envelope::codec::cdr::{CdrError, KeySchema, Representation, Schema, SchemaError};
+use aldis_envelope::codec::cdr::{CdrError, KeySchema, Representation, Schema, SchemaError, Value};
 use aldis_envelope::description::{DescriptionError, Extensibility};
+use aldis_envelope::name::NameError;
 use aldis_envelope::umaa::{self, TopicInfo, v6_0};
-use aldis_envelope::{Change, ContentType, Instance, KeyHash, Label, Message, Name, NameError, Source};
+use aldis_envelope::{Change, ContentType, Instance, KeyHash, Label, Message, Name, Source};
 use bytes::Bytes;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -29,8 +30,8 @@ pub enum NewerError {
 #[derive(Debug)]
 struct Newer {
     map: TopicMap,
-    schema: Schema,
-    keys: Option<KeySchema>,
+    /// As described, and with everything final.
+    shapes: [(Schema, Option<KeySchema>); 2],
 }
 
 /// One topic of 5.2.1.
@@ -64,7 +65,11 @@ impl NewerBus {
         for topic in v6_0::topics() {
             let schema = Schema::new(translator.newer(), &topic.type_name)?;
             let map = TopicMap::new(&topic.name, &topic.type_name, translator.newer(), source)?;
-            newer.insert(topic.name, Newer { map, keys: KeySchema::new(&schema), schema });
+            let shapes = [schema.clone(), schema.as_final()].map(|schema| {
+                let keys = KeySchema::new(&schema);
+                (schema, keys)
+            });
+            newer.insert(topic.name, Newer { map, shapes });
         }
         for info in umaa::topics() {
             let label = Arc::new(Label::broadcast(ContentType::Umaa, Name::new(info.name)?, source));
@@ -84,7 +89,7 @@ impl NewerBus {
         };
         let Imported { message, source_time } = newer.map.import(taken)?;
         let value = if message.change == Change::Put {
-            newer.schema_of(&message.content).read(&message.content).map(|read| read.value)
+            newer.shape(&message.content).0.read(&message.content).map(|read| read.value)
         } else {
             newer.partial(message.instance.as_deref())
         };
@@ -155,31 +160,26 @@ impl NewerBus {
 
 impl Newer {
     /// The type as the header of a sample tells of it: appendable, or with everything final.
-    fn schema_of(&self, sample: &[u8]) -> Schema {
-        let plain = matches!(sample, [0, 6 | 7, ..]);
-        if plain { self.schema.as_final() } else { self.schema.clone() }
+    fn shape(&self, sample: &[u8]) -> &(Schema, Option<KeySchema>) {
+        &self.shapes[usize::from(matches!(sample, [0, 6 | 7, ..]))]
     }
 
-    fn partial(
-        &self,
-        instance: Option<&Instance>,
-    ) -> Result<aldis_envelope::codec::cdr::Value, Box<CdrError>> {
+    fn partial(&self, instance: Option<&Instance>) -> Result<Value, Box<CdrError>> {
         let key = instance.and_then(|instance| instance.key.as_deref()).unwrap_or_default();
-        match &self.keys {
-            Some(keys) => keys.partial(&self.schema, key),
-            None => self.schema.read(key).map(|read| read.value),
+        match &self.shapes[0] {
+            (schema, Some(keys)) => keys.partial(schema, key),
+            (schema, None) => schema.read(key).map(|read| read.value),
         }
     }
 
     fn written(&self, sample: &Sample, representation: Representation) -> Result<Vec<u8>, Box<CdrError>> {
-        let schema = self.schema_of(&representation.id().to_be_bytes());
-        if sample.change == Change::Put {
-            return schema.write(&sample.value, representation);
+        match self.shape(&representation.id().to_be_bytes()) {
+            (schema, Some(keys)) if sample.change != Change::Put => {
+                let key = keys.of_value(schema, &sample.value)?.key.unwrap_or_default();
+                keys.key_sample(&key, representation)
+            }
+            (schema, _) => schema.write(&sample.value, representation),
         }
-        let keys = KeySchema::new(&schema);
-        let Some(keys) = keys else { return schema.write(&sample.value, representation) };
-        let key = keys.of_value(&schema, &sample.value)?.key.unwrap_or_default();
-        keys.key_sample(&key, representation)
     }
 }
 

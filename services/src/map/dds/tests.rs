@@ -85,7 +85,7 @@ fn what_is_not_exactly_ours_stays_as_it_came() {
     let (mut map, schema, report) = health();
     let sent = umaa::put(umaa::label::<HealthReport>(source()).unwrap(), &report);
     let bytes = map.export(&sent, DELIMITED).unwrap().bytes;
-    // Nanoseconds outside their range: bytes 16 to 20 of the body.
+    // Nanoseconds outside their range: behind both headers, the code, the header of the time and its seconds.
     let mut late = bytes.clone();
     late[4 + 4 + 4 + 4 + 8..][..4].copy_from_slice(&(-1_i32).to_le_bytes());
     let came = map.import(&taken(Change::Put, Body::Sample(late.clone().into()))).unwrap().message;
@@ -96,7 +96,8 @@ fn what_is_not_exactly_ours_stays_as_it_came() {
     assert_eq!(schema.as_final().read(&anew).unwrap().value, schema.read(&late).unwrap().value);
     // A member more than we know: it leaves as it came or not at all.
     let mut longer = bytes;
-    longer[4..8].copy_from_slice(&(u32::from_le_bytes(longer[4..8].try_into().unwrap()) + 4).to_le_bytes());
+    let length = u32::from_le_bytes(longer[4..8].try_into().unwrap()) + 4;
+    longer[4..8].copy_from_slice(&length.to_le_bytes());
     longer.extend([9; 4]);
     let came = map.import(&taken(Change::Put, Body::Sample(longer.clone().into()))).unwrap().message;
     assert_eq!((&came.label.attributes.content_type, &came.instance), (&ContentType::Cdr, &sent.instance));

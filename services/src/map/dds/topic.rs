@@ -2,8 +2,9 @@
 
 use aldis_envelope::codec::cdr::{CdrError, KeySchema, Representation, Schema};
 use aldis_envelope::description::{Extensibility, Library};
+use aldis_envelope::name::NameError;
 use aldis_envelope::umaa::{self, TopicInfo};
-use aldis_envelope::{Change, ContentType, Instance, KeyHash, Label, Message, Name, NameError, Source, Wall};
+use aldis_envelope::{Change, ContentType, Instance, KeyHash, Label, Message, Name, Source, Wall};
 use bytes::Bytes;
 use std::collections::BTreeMap;
 use std::sync::Arc;

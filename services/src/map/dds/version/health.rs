@@ -15,7 +15,11 @@ impl Translator {
     pub(super) fn health_to_older(&mut self, sample: &Sample) -> Result<Vec<Sample>, Lost> {
         let (resource, code) = self.resource(sample, true)?;
         let code = code.ok_or_else(|| due(&sample.topic, "code"))?;
-        let value = self.converted(sample, TYPE, false)?;
+        let mut value = self.converted(sample, TYPE, false)?;
+        if sample.change != Change::Put {
+            // The code is no part of the older key.
+            set(&self.older, TYPE, &mut value, "code", None);
+        }
         let older = Sample { topic: TOPIC.to_owned(), change: sample.change, value };
         if sample.change == Change::Put {
             self.codes_of(resource).insert(code);

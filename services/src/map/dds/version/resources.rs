@@ -58,13 +58,14 @@ impl Translator {
     pub(super) fn config_to_newer(&mut self, sample: &Sample) -> Result<Vec<Sample>, Lost> {
         let of = |name| member(&self.older, REPORT, &sample.value, name);
         let source = guid_of(of("source")).ok_or_else(|| due(CONFIG, "source"))?;
+        let (stamp, resources) = (of("timeStamp"), of("resources"));
         let set = derived([source, Guid::NIL]);
-        let identifier = self.identifier_of(&sample.value, source)?;
+        let identifier = self.identifier_of(&sample.value)?;
         if sample.change != Change::Put {
             return Ok(self.config_ends(sample.change, source, set, identifier));
         }
-        let stamp = of("timeStamp").cloned().ok_or_else(|| due(CONFIG, "timeStamp"))?;
-        let Some(Value::List(resources)) = of("resources") else { return Err(due(CONFIG, "resources")) };
+        let stamp = stamp.cloned().ok_or_else(|| due(CONFIG, "timeStamp"))?;
+        let Some(Value::List(resources)) = resources else { return Err(due(CONFIG, "resources")) };
         let mut wanted = BTreeMap::new();
         for resource in resources {
             let id = guid_of(member(&self.older, DEFINITION, resource, "resourceID"))
@@ -73,8 +74,8 @@ impl Translator {
             wanted.insert(derived([source, id]), newer);
         }
         let said = self.said.entry(source).or_default();
-        let gone = said.elements.keys().filter(|id| !wanted.contains_key(id)).copied().collect::<Vec<_>>();
-        let changed = wanted.iter().filter(|(id, held)| said.elements.get(id) != Some(held));
+        let gone = said.elements.keys().filter(|id| !wanted.contains_key(*id)).copied().collect::<Vec<_>>();
+        let changed = wanted.iter().filter(|(id, held)| said.elements.get(*id) != Some(*held));
         let mut samples: Vec<_> = gone.iter().map(|id| element_ends(Change::Dispose, set, *id)).collect();
         // An update ends with an element that is there, if any is: then its timestamp tells one update from the next.
         if let Some(last) = gone.last() {
@@ -82,7 +83,8 @@ impl Translator {
         }
         for (id, held) in changed {
             said.update = (*id, Some(stamp.clone()));
-            let value = Value::Structure(vec![Some(held.clone()), octets(set), octets(*id), Some(stamp.clone())]);
+            let value =
+                Value::Structure(vec![Some(held.clone()), octets(set), octets(*id), Some(stamp.clone())]);
             samples.push(Sample { topic: RESOURCES_ELEMENT.to_owned(), change: Change::Put, value });
         }
         let size = Value::Signed(wanted.len() as i64);
@@ -95,9 +97,9 @@ impl Translator {
     }
 
     /// The source of a report as an identifier.
-    fn identifier_of(&mut self, report: &Value, source: Guid) -> Result<Value, Lost> {
+    fn identifier_of(&mut self, report: &Value) -> Result<Value, Lost> {
         let newer = self.converted_value(CONFIG, REPORT, report, true, true)?;
-        member(&self.newer, REPORT, &newer, "source").cloned().ok_or_else(|| due(CONFIG, &source.to_string()))
+        member(&self.newer, REPORT, &newer, "source").cloned().ok_or_else(|| due(CONFIG, "source"))
     }
 
     /// The report ends, and then each of its elements.
@@ -171,7 +173,8 @@ impl Translator {
         }
         let stamp = member(&self.newer, REPORT, report, "timeStamp").cloned();
         let source = guid_of(member(&self.newer, REPORT, report, "source"));
-        let (held, made) = (elements.values().map(|(held, _)| held.clone()).collect::<Vec<_>>(), made.clone());
+        let (held, made) =
+            (elements.values().map(|(held, _)| held.clone()).collect::<Vec<_>>(), made.clone());
         if held.len() > 256 {
             let (topic, member) = (CONFIG.to_owned(), "resources".to_owned());
             return Err(Lost::TooLong { topic, member, length: held.len(), bound: 256 });
