@@ -9,6 +9,7 @@ pub mod calls;
 pub mod conform;
 pub mod counters;
 pub mod dds;
+pub mod destinations;
 pub mod entities;
 pub mod event;
 pub mod health;

@@ -8,6 +8,7 @@ mod calls;
 mod contention;
 mod custody;
 mod foreign;
+mod idl;
 mod journal;
 mod link;
 mod lmcp;

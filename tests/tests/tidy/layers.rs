@@ -16,7 +16,7 @@ const PACKAGES: [(&str, &[&str]); 3] = [
 const LAYERS: [&[&str]; 9] = [
     &["journal", "service"],
     &["allow", "calls", "counters", "dds", "notes", "streams"],
-    &["link", "map", "plan", "umaa"],
+    &["destinations", "link", "map", "plan", "umaa"],
     &["event"],
     &["bridge", "labels"],
     &["conform", "entities", "health", "log", "manager", "player", "recorder", "track", "uxas"],

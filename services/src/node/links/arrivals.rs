@@ -34,6 +34,7 @@ impl Node {
             self.done_for_link(origin, id);
         } else {
             self.counters.imported_by_links += 1;
+            self.links.destinations.hear(&envelope.message);
             self.import_by_link(now, place, id, envelope, effects);
             self.settle(now, effects);
         }
