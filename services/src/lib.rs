@@ -9,6 +9,7 @@ pub mod calls;
 pub mod conform;
 pub mod counters;
 pub mod dds;
+pub mod domain;
 pub mod event;
 pub mod health;
 mod host;

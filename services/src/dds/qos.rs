@@ -77,9 +77,13 @@ impl Topics {
 
 /// The data patterns of UMAA (umaa-so, Quality of service). Version 6.0 names topics by their types.
 fn by_pattern(name: &str) -> Option<Qos> {
+    let kept = |keep| Some(Qos { durability: Durability::TransientLocal, keep, samples_max: SAMPLES_MAX });
+    if name.starts_with("dds::") {
+        // Any other topic of a DDS domain: its own promises are kept there, on the way the newest of each instance is.
+        return kept(Keep::Last(1));
+    }
     let name = name.strip_prefix("UMAA::")?;
     let name = name.strip_suffix("Type").unwrap_or(name);
-    let kept = |keep| Some(Qos { durability: Durability::TransientLocal, keep, samples_max: SAMPLES_MAX });
     if name.ends_with("LogReport") {
         return Some(Qos { durability: Durability::Volatile, keep: Keep::All, samples_max: SAMPLES_MAX });
     }

@@ -322,7 +322,8 @@ impl World {
             Effect::Say(note) => self.observe(place, Seen::Said(&note)),
             Effect::Transmit(link, carrier, frame) => self.transmit(place, link, carrier, frame),
             Effect::Persist(number, records) => self.persist(place, number, records),
-            Effect::PauseInput(_) | Effect::Found(..) => {}
+            // The simulator joins no domain.
+            Effect::PauseInput(_) | Effect::Found(..) | Effect::Domain(..) => {}
         }
     }
 

@@ -19,7 +19,7 @@ const LAYERS: [&[&str]; 9] = [
     &["link", "map", "plan", "umaa"],
     &["event"],
     &["bridge", "labels"],
-    &["conform", "health", "log", "manager", "player", "track", "uxas"],
+    &["conform", "domain", "health", "log", "manager", "player", "track", "uxas"],
     &["host", "registry"],
     &["node"],
     &["sim"],
