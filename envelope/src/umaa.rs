@@ -9,11 +9,13 @@ mod enumeration;
 mod key;
 mod number;
 mod sequence;
+mod structure;
 #[cfg(test)]
 mod tests;
 mod text;
 mod topics;
 pub mod v5_2_1;
+pub mod v6_0;
 
 pub use collection::{LargeCollection, LargeListMetadata, LargeSetMetadata, ListElement, SetElement};
 pub use command::{
@@ -25,6 +27,7 @@ pub use enumeration::{
 pub use key::{CommandKey, ElementKey, HealthKey, Key, SessionKey, SourceKey};
 pub use number::{DurationSeconds, LargeCollectionSize, OutOfRange, Quaternion};
 pub use sequence::{Sequence, SequenceTooLong};
+pub use structure::Described;
 pub use text::{LongDescription, TextTooLong};
 pub use topics::{JsonError, TopicInfo, topic, topics};
 pub use v5_2_1::*;

@@ -6,12 +6,14 @@
 //! [`aldis_envelope::aldis::dds`] and know neither services nor the bus.
 
 mod history;
+mod pattern;
 mod qos;
 mod reading;
 mod record;
 mod writers;
 
 pub use history::History;
+pub use pattern::Pattern;
 pub use qos::{Durability, Keep, Qos, TopicRule, Topics};
 pub use reading::{Reading, Step};
 pub use record::{Record, RecordError};

@@ -1,5 +1,6 @@
 //! Large Sets and Large Lists on the wire (ICD 3.8, tables 4 to 7): metadata inside a report, each element a sample.
 
+use super::structure::structure;
 use super::{ElementKey, LargeCollectionSize, Topic};
 use crate::guid::Guid;
 use crate::time::DateTime;
@@ -15,39 +16,36 @@ pub trait LargeCollection: Clone + PartialEq + fmt::Debug + Send + Sync + 'stati
     const ELEMENT_NAME: &'static str;
 }
 
-/// Says of a large set what belongs to it (`LargeSetMetadata`, table 4).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "camelCase", deny_unknown_fields)]
-pub struct LargeSetMetadata {
-    /// The set.
-    #[serde(rename = "setID")]
-    pub set_id: Guid,
-    /// The element whose reception ends the update; nil for a set that is empty from the start (3.8.3).
-    #[serde(rename = "updateElementID")]
-    pub update_element_id: Guid,
-    /// The timestamp of that element; none when the update ended with its disposal.
-    pub update_element_timestamp: Option<DateTime>,
-    /// How many elements the set has after the update.
-    pub size: LargeCollectionSize,
+structure! {
+    /// Says of a large set what belongs to it (`LargeSetMetadata`, table 4).
+    #[derive(Copy, Eq)]
+    LargeSetMetadata = "UMAA::Common::LargeSetMetadata" {
+        /// The set.
+        set_id: Guid = "setID",
+        /// The element whose reception ends the update; nil for a set that is empty from the start (3.8.3).
+        update_element_id: Guid = "updateElementID",
+        /// The timestamp of that element; none when the update ended with its disposal.
+        update_element_timestamp: Option<DateTime> = "updateElementTimestamp",
+        /// How many elements the set has after the update.
+        size: LargeCollectionSize = "size",
+    }
 }
 
-/// Says of a large list what belongs to it (`LargeListMetadata`, table 6).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "camelCase", deny_unknown_fields)]
-pub struct LargeListMetadata {
-    /// The list.
-    #[serde(rename = "listID")]
-    pub list_id: Guid,
-    /// The element whose reception ends the update; nil for a list that is empty from the start (3.8.3).
-    #[serde(rename = "updateElementID")]
-    pub update_element_id: Guid,
-    /// The timestamp of that element; none when the update ended with its disposal.
-    pub update_element_timestamp: Option<DateTime>,
-    /// The first element of the list; nil when it is empty.
-    #[serde(rename = "startingElementID")]
-    pub starting_element_id: Guid,
-    /// How many elements the list has after the update.
-    pub size: LargeCollectionSize,
+structure! {
+    /// Says of a large list what belongs to it (`LargeListMetadata`, table 6).
+    #[derive(Copy, Eq)]
+    LargeListMetadata = "UMAA::Common::LargeListMetadata" {
+        /// The list.
+        list_id: Guid = "listID",
+        /// The element whose reception ends the update; nil for a list that is empty from the start (3.8.3).
+        update_element_id: Guid = "updateElementID",
+        /// The timestamp of that element; none when the update ended with its disposal.
+        update_element_timestamp: Option<DateTime> = "updateElementTimestamp",
+        /// The first element of the list; nil when it is empty.
+        starting_element_id: Guid = "startingElementID",
+        /// How many elements the list has after the update.
+        size: LargeCollectionSize = "size",
+    }
 }
 
 /// An element of a large set (table 5).

@@ -35,6 +35,17 @@ macro_rules! enumeration {
             }
         }
 
+        impl crate::umaa::structure::Described for $name {
+            fn described(
+                draft: &mut crate::description::Draft,
+            ) -> Result<crate::description::Type, crate::description::DescriptionError> {
+                let names = Self::ALL.iter().map(|value| value.name());
+                let literals = crate::description::Enumeration::counted(names);
+                let name = concat!("UMAA::Common::MaritimeEnumeration::", $idl);
+                crate::umaa::structure::define(draft, name, crate::description::Definition::Enumeration(literals))
+            }
+        }
+
         impl fmt::Display for $name {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.pad(self.name())

@@ -8,6 +8,7 @@ use super::{
     Topic, decode, encode,
 };
 use crate::change::Instance;
+use crate::guid::Guid;
 use bytes::Bytes;
 use serde_json::Value;
 
@@ -21,6 +22,7 @@ pub struct TopicInfo {
     /// The names of its key members.
     pub key_members: &'static [&'static str],
     json_of: fn(&[u8]) -> Result<Value, ContentError>,
+    key_of: fn(&[u8]) -> Result<Bytes, ContentError>,
     key_json_of: fn(&Instance) -> Option<Value>,
     sample_of: fn(&str) -> Result<(Bytes, Instance), JsonError>,
 }
@@ -65,6 +67,7 @@ impl TopicInfo {
             type_name: T::TYPE_NAME,
             key_members: T::Key::MEMBERS,
             json_of: json_of::<T>,
+            key_of: |content| decode::<T>(content).map(|sample| sample.key().to_bytes()),
             key_json_of: |instance| {
                 T::Key::of_instance(instance).and_then(|key| serde_json::to_value(key).ok())
             },
@@ -78,6 +81,30 @@ impl TopicInfo {
     /// [`ContentError`] when the content is not exactly one sample of the topic.
     pub fn json(&self, content: &[u8]) -> Result<Value, ContentError> {
         (self.json_of)(content)
+    }
+
+    /// The serialized key of a content.
+    ///
+    /// # Errors
+    /// [`ContentError`] when the content is not exactly one sample of the topic, each value in its range.
+    pub fn key(&self, content: &[u8]) -> Result<Bytes, ContentError> {
+        (self.key_of)(content)
+    }
+
+    /// Who made a sample, by its content; none for elements of large collections.
+    pub fn source(&self, content: &[u8]) -> Option<Guid> {
+        self.key_guid(content, "source")
+    }
+
+    /// Who a command is for, by its content; none for what is no command.
+    pub fn destination(&self, content: &[u8]) -> Option<Guid> {
+        self.key_guid(content, "destination")
+    }
+
+    fn key_guid(&self, content: &[u8], member: &str) -> Option<Guid> {
+        let place = self.key_members.iter().position(|name| *name == member)?;
+        let key = self.key(content).ok()?;
+        key.get(16 * place..)?.first_chunk().copied().map(Guid)
     }
 
     /// The key members of an instance in JSON, for what has no content; none where only a digest of them is known.

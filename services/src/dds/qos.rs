@@ -1,5 +1,6 @@
 //! Quality of service by topic: the pattern of data that a name belongs to, or what the configuration says.
 
+use super::Pattern;
 use aldis_envelope::{Address, Prefix};
 
 /// How many samples of one stream are retained where nothing else is said: at 300 bytes each 60 MB.
@@ -75,8 +76,9 @@ impl Topics {
     }
 }
 
-/// The data patterns of UMAA (umaa-so, Quality of service). Version 6.0 names topics by their types.
+/// What the pattern of a name asks for.
 fn by_pattern(name: &str) -> Option<Qos> {
+<<<<<<< HEAD
     let kept = |keep| Some(Qos { durability: Durability::TransientLocal, keep, samples_max: SAMPLES_MAX });
     if name.starts_with("dds::") {
         // Any other topic of a DDS domain: its own promises are kept there, on the way the newest of each instance is.
@@ -88,10 +90,17 @@ fn by_pattern(name: &str) -> Option<Qos> {
         return Some(Qos { durability: Durability::Volatile, keep: Keep::All, samples_max: SAMPLES_MAX });
     }
     if name.ends_with("CommandStatus") {
+=======
+    let (durability, keep) = match Pattern::of(name)? {
+        Pattern::Log => (Durability::Volatile, Keep::All),
+>>>>>>> types
         // No transition may be skipped.
-        return kept(Keep::All);
-    }
-    kept(Keep::Last(1))
+        Pattern::Status => (Durability::TransientLocal, Keep::All),
+        Pattern::Command | Pattern::Response | Pattern::Element | Pattern::State => {
+            (Durability::TransientLocal, Keep::Last(1))
+        }
+    };
+    Some(Qos { durability, keep, samples_max: SAMPLES_MAX })
 }
 
 #[cfg(test)]

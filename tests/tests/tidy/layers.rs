@@ -15,7 +15,7 @@ const PACKAGES: [(&str, &[&str]); 3] = [
 /// circle can be.
 const LAYERS: [&[&str]; 9] = [
     &["journal", "service"],
-    &["allow", "calls", "counters", "dds", "notes", "streams"],
+    &["allow", "calls", "counters", "dds", "destinations", "notes", "streams"],
     &["link", "map", "plan", "umaa"],
     &["event"],
     &["bridge", "labels"],

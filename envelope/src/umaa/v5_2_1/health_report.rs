@@ -3,28 +3,28 @@
 use super::sourced;
 use crate::guid::Guid;
 use crate::time::DateTime;
+use crate::umaa::structure::structure;
 use crate::umaa::{ErrorCode, ErrorCondition, HealthKey, LongDescription, Topic};
-use serde::{Deserialize, Serialize};
 
-/// The most recent health of one resource.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "camelCase", deny_unknown_fields)]
-pub struct HealthReport {
-    /// The kind of system.
-    pub code: ErrorCode,
-    /// When the error occurred.
-    pub log_time: DateTime,
-    /// How bad it is.
-    pub severity: ErrorCondition,
-    /// In words, for people.
-    pub status: LongDescription,
-    /// When the report was made.
-    pub time_stamp: DateTime,
-    /// Who reports (key).
-    pub source: Guid,
-    /// Whose health it is (key).
-    #[serde(rename = "resourceID")]
-    pub resource_id: Guid,
+structure! {
+    /// The most recent health of one resource.
+    #[derive(Eq)]
+    HealthReport = "UMAA::SO::HealthReport::HealthReportType" {
+        /// The kind of system.
+        code: ErrorCode = "code",
+        /// When the error occurred.
+        log_time: DateTime = "logTime",
+        /// How bad it is.
+        severity: ErrorCondition = "severity",
+        /// In words, for people.
+        status: LongDescription = "status",
+        /// When the report was made.
+        time_stamp: DateTime = "timeStamp",
+        /// Who reports (key).
+        source: Guid = "source" [key],
+        /// Whose health it is (key).
+        resource_id: Guid = "resourceID" [key],
+    }
 }
 
 impl Topic for HealthReport {

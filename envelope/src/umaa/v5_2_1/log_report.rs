@@ -3,21 +3,22 @@
 use super::report;
 use crate::guid::Guid;
 use crate::time::DateTime;
+use crate::umaa::structure::structure;
 use crate::umaa::{LogLevel, LongDescription};
-use serde::{Deserialize, Serialize};
 
-/// An entry for the fleet's log.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "camelCase", deny_unknown_fields)]
-pub struct LogReport {
-    /// In words, for people.
-    pub entry: LongDescription,
-    /// Its level.
-    pub level: LogLevel,
-    /// When it was made.
-    pub time_stamp: DateTime,
-    /// Who reports (key).
-    pub source: Guid,
+structure! {
+    /// An entry for the fleet's log.
+    #[derive(Eq)]
+    LogReport = "UMAA::SO::LogReport::LogReportType" {
+        /// In words, for people.
+        entry: LongDescription = "entry",
+        /// Its level.
+        level: LogLevel = "level",
+        /// When it was made.
+        time_stamp: DateTime = "timeStamp",
+        /// Who reports (key).
+        source: Guid = "source" [key],
+    }
 }
 
 report!(LogReport, "UMAA::SO::LogReport::LogReport");

@@ -3,28 +3,27 @@
 use super::report;
 use crate::guid::Guid;
 use crate::time::DateTime;
+use crate::umaa::structure::structure;
 use crate::umaa::{CommandAckReport, CommandStatus, DurationSeconds, NoExecutionStatus, Sequence};
 use crate::umaa_command;
-use serde::{Deserialize, Serialize};
 
-/// Asks for control of a resource (table 20). The consumer that asks is its source.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "camelCase", deny_unknown_fields)]
-pub struct ResourceAllocationCommand {
-    /// How long control is wanted; without end where none is given.
-    pub duration: Option<DurationSeconds>,
-    /// The resource.
-    #[serde(rename = "resourceID")]
-    pub resource_id: Guid,
-    /// When the command was made.
-    pub time_stamp: DateTime,
-    /// The consumer (key).
-    pub source: Guid,
-    /// The session (key).
-    #[serde(rename = "sessionID")]
-    pub session_id: Guid,
-    /// The provider of ResourceAllocation (key).
-    pub destination: Guid,
+structure! {
+    /// Asks for control of a resource (table 20). The consumer that asks is its source.
+    #[derive(Eq)]
+    ResourceAllocationCommand = "UMAA::SO::ResourceAllocation::ResourceAllocationCommandType" {
+        /// How long control is wanted; without end where none is given.
+        duration: Option<DurationSeconds> = "duration",
+        /// The resource.
+        resource_id: Guid = "resourceID",
+        /// When the command was made.
+        time_stamp: DateTime = "timeStamp",
+        /// The consumer (key).
+        source: Guid = "source" [key],
+        /// The session (key).
+        session_id: Guid = "sessionID" [key],
+        /// The provider of ResourceAllocation (key).
+        destination: Guid = "destination" [key],
+    }
 }
 
 umaa_command!(
@@ -38,24 +37,23 @@ pub type ResourceAllocationCommandStatus = CommandStatus<ResourceAllocationComma
 /// The [`ResourceAllocationCommand`] that is executed (table 14).
 pub type ResourceAllocationCommandAckReport = CommandAckReport<ResourceAllocationCommand>;
 
-/// Sets who may control a resource, and who goes before whom (table 21).
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "camelCase", deny_unknown_fields)]
-pub struct ResourceAllocationPriorityCommand {
-    /// The consumers, from low to high priority.
-    pub priorities: Sequence<Guid, 100>,
-    /// The resource.
-    #[serde(rename = "resourceID")]
-    pub resource_id: Guid,
-    /// When the command was made.
-    pub time_stamp: DateTime,
-    /// The consumer of this command (key).
-    pub source: Guid,
-    /// The session (key).
-    #[serde(rename = "sessionID")]
-    pub session_id: Guid,
-    /// The provider of ResourceAllocation (key).
-    pub destination: Guid,
+structure! {
+    /// Sets who may control a resource, and who goes before whom (table 21).
+    #[derive(Eq)]
+    ResourceAllocationPriorityCommand = "UMAA::SO::ResourceAllocation::ResourceAllocationPriorityCommandType" {
+        /// The consumers, from low to high priority.
+        priorities: Sequence<Guid, 100> = "priorities",
+        /// The resource.
+        resource_id: Guid = "resourceID",
+        /// When the command was made.
+        time_stamp: DateTime = "timeStamp",
+        /// The consumer of this command (key).
+        source: Guid = "source" [key],
+        /// The session (key).
+        session_id: Guid = "sessionID" [key],
+        /// The provider of ResourceAllocation (key).
+        destination: Guid = "destination" [key],
+    }
 }
 
 umaa_command!(
@@ -69,87 +67,91 @@ pub type ResourceAllocationPriorityCommandStatus = CommandStatus<ResourceAllocat
 /// The [`ResourceAllocationPriorityCommand`] that is executed (table 18).
 pub type ResourceAllocationPriorityCommandAckReport = CommandAckReport<ResourceAllocationPriorityCommand>;
 
-/// Who controls a resource until when (table 30).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "camelCase", deny_unknown_fields)]
-pub struct ResourceAllocationControlSession {
-    /// The consumer in control.
-    pub controlling_consumer: Guid,
-    /// When its control ends, in the arbiter's clock; without end where none is given.
-    pub end_time: Option<DateTime>,
+structure! {
+    /// Who controls a resource until when (table 30).
+    #[derive(Copy, Eq)]
+    ResourceAllocationControlSession = "UMAA::SO::ResourceAllocation::ResourceAllocationControlSession" {
+        /// The consumer in control.
+        controlling_consumer: Guid = "controllingConsumer",
+        /// When its control ends, in the arbiter's clock; without end where none is given.
+        end_time: Option<DateTime> = "endTime",
+    }
 }
 
-/// Who controls a resource (table 29).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "camelCase", deny_unknown_fields)]
-pub struct ResourceAllocationControlInfo {
-    /// Who controls it; none where nobody does.
-    pub control_session: Option<ResourceAllocationControlSession>,
-    /// The resource (key in the list).
-    #[serde(rename = "resourceID")]
-    pub resource_id: Guid,
+structure! {
+    /// Who controls a resource (table 29).
+    #[derive(Copy, Eq)]
+    ResourceAllocationControlInfo = "UMAA::SO::ResourceAllocation::ResourceAllocationControlInfo" {
+        /// Who controls it; none where nobody does.
+        control_session: Option<ResourceAllocationControlSession> = "controlSession",
+        /// The resource (key in the list).
+        resource_id: Guid = "resourceID" [key],
+    }
 }
 
-/// Who controls what (table 13).
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "camelCase", deny_unknown_fields)]
-pub struct ResourceAllocationReport {
-    /// Every resource that the source allocates.
-    pub control_info: Sequence<ResourceAllocationControlInfo, 256>,
-    /// When the report was made.
-    pub time_stamp: DateTime,
-    /// The provider of ResourceAllocation (key).
-    pub source: Guid,
+structure! {
+    /// Who controls what (table 13).
+    #[derive(Eq)]
+    ResourceAllocationReport = "UMAA::SO::ResourceAllocation::ResourceAllocationReportType" {
+        /// Every resource that the source allocates.
+        control_info: Sequence<ResourceAllocationControlInfo, 256> = "controlInfo",
+        /// When the report was made.
+        time_stamp: DateTime = "timeStamp",
+        /// The provider of ResourceAllocation (key).
+        source: Guid = "source" [key],
+    }
 }
 
 report!(ResourceAllocationReport, "UMAA::SO::ResourceAllocation::ResourceAllocationReport");
 
-/// Which providers share one resource (`ResourceAllocationDefinitionType`, table 31).
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "camelCase", deny_unknown_fields)]
-pub struct ResourceAllocationDefinition {
-    /// The providers: no two of them may be commanded by different consumers at a time.
-    pub related_sources: Sequence<Guid, 100>,
-    /// The resource (key in the list).
-    #[serde(rename = "resourceID")]
-    pub resource_id: Guid,
+structure! {
+    /// Which providers share one resource (`ResourceAllocationDefinitionType`, table 31).
+    #[derive(Eq)]
+    ResourceAllocationDefinition = "UMAA::SO::ResourceAllocation::ResourceAllocationDefinitionType" {
+        /// The providers: no two of them may be commanded by different consumers at a time.
+        related_sources: Sequence<Guid, 100> = "relatedSources",
+        /// The resource (key in the list).
+        resource_id: Guid = "resourceID" [key],
+    }
 }
 
-/// Which providers share which resource (table 16).
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "camelCase", deny_unknown_fields)]
-pub struct ResourceAllocationConfigReport {
-    /// Every resource that the source allocates.
-    pub resources: Sequence<ResourceAllocationDefinition, 256>,
-    /// When the report was made.
-    pub time_stamp: DateTime,
-    /// The provider of ResourceAllocation (key).
-    pub source: Guid,
+structure! {
+    /// Which providers share which resource (table 16).
+    #[derive(Eq)]
+    ResourceAllocationConfigReport = "UMAA::SO::ResourceAllocation::ResourceAllocationConfigReportType" {
+        /// Every resource that the source allocates.
+        resources: Sequence<ResourceAllocationDefinition, 256> = "resources",
+        /// When the report was made.
+        time_stamp: DateTime = "timeStamp",
+        /// The provider of ResourceAllocation (key).
+        source: Guid = "source" [key],
+    }
 }
 
 report!(ResourceAllocationConfigReport, "UMAA::SO::ResourceAllocation::ResourceAllocationConfigReport");
 
-/// Who may control a resource, and who goes before whom (table 32).
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "camelCase", deny_unknown_fields)]
-pub struct ResourceAllocationPriorityInfo {
-    /// The consumers, from low to high priority.
-    pub priorities: Sequence<Guid, 100>,
-    /// The resource (key in the list).
-    #[serde(rename = "resourceID")]
-    pub resource_id: Guid,
+structure! {
+    /// Who may control a resource, and who goes before whom (table 32).
+    #[derive(Eq)]
+    ResourceAllocationPriorityInfo = "UMAA::SO::ResourceAllocation::ResourceAllocationPriorityInfo" {
+        /// The consumers, from low to high priority.
+        priorities: Sequence<Guid, 100> = "priorities",
+        /// The resource (key in the list).
+        resource_id: Guid = "resourceID" [key],
+    }
 }
 
-/// The priorities of every resource (table 17). The ICD's table has lost the bound; the IDL says 32 (umaa-so).
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "camelCase", deny_unknown_fields)]
-pub struct ResourceAllocationPriorityReport {
-    /// Every resource that the source allocates.
-    pub priorities: Sequence<ResourceAllocationPriorityInfo, 32>,
-    /// When the report was made.
-    pub time_stamp: DateTime,
-    /// The provider of ResourceAllocation (key).
-    pub source: Guid,
+structure! {
+    /// The priorities of every resource (table 17). The ICD's table has lost the bound; the IDL says 32 (umaa-so).
+    #[derive(Eq)]
+    ResourceAllocationPriorityReport = "UMAA::SO::ResourceAllocation::ResourceAllocationPriorityReportType" {
+        /// Every resource that the source allocates.
+        priorities: Sequence<ResourceAllocationPriorityInfo, 32> = "priorities",
+        /// When the report was made.
+        time_stamp: DateTime = "timeStamp",
+        /// The provider of ResourceAllocation (key).
+        source: Guid = "source" [key],
+    }
 }
 
 report!(ResourceAllocationPriorityReport, "UMAA::SO::ResourceAllocation::ResourceAllocationPriorityReport");
