@@ -28,7 +28,7 @@ pub(crate) mod uxas_file;
 pub(crate) use acl::acl;
 pub(crate) use allow::Allow;
 #[cfg(feature = "dds")]
-pub(crate) use bridge::{BENCH_TYPE, bench_types};
+pub(crate) use bridge::{BENCH_TYPE, bench_types, dds_types};
 pub(crate) use bridge::{Bridge, Check, Dds, Endpoint, Framing, Sockets};
 pub(crate) use bus::Bus;
 pub(crate) use entities::{Entities, Operators};
@@ -119,7 +119,6 @@ impl Config {
         let base = path.parent().unwrap_or(Path::new(""));
         config.bus.resolve(base);
         config.links.iter_mut().for_each(|link| link.resolve(base));
-        config.bridges.iter_mut().for_each(|bridge| bridge.resolve(base));
         config.journal.iter_mut().for_each(|journal| journal.resolve(base));
         read::read_files(&mut config, &file, &text, base)?;
         Ok(config)

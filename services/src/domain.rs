@@ -17,6 +17,7 @@ mod tests;
 
 pub use config::{DomainConfig, Pattern, QualityRule};
 pub use presence::mark;
+pub use quality::text as quality_in_words;
 pub use report::{DOMAIN_QUERY, DOMAIN_STATUS, DomainStatus, RouteStatus};
 
 use crate::counters::counters;

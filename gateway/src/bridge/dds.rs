@@ -31,6 +31,11 @@ pub(crate) struct Endpoint {
     pub(crate) stall_timeout: Duration,
 }
 
+/// Quality of service in words.
+pub(crate) fn words(qos: &aldis_dds::Qos) -> String {
+    aldis_services::domain::quality_in_words(&convert::quality(qos))
+}
+
 /// Takes part in a domain until the node ends. Blocks its thread: Cyclone DDS waits in places.
 pub(crate) fn serve(core: &Shared, endpoint: &Endpoint) {
     let exited = core.lock().exited();

@@ -10,7 +10,7 @@ pub(crate) use common::Common;
 pub(crate) use dds::Dds;
 pub(super) use dds::DdsTable;
 #[cfg(feature = "dds")]
-pub(crate) use dds::{BENCH_TYPE, bench_types};
+pub(crate) use dds::{BENCH_TYPE, bench_types, dds_types};
 pub(super) use uxas_serial::UxasSerialTable;
 pub(crate) use uxas_serial::{Check, UxasSerial};
 pub(super) use uxas_tcp::UxasTcpTable;
@@ -24,7 +24,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::net::SocketAddr;
 use std::ops::RangeInclusive;
-use std::path::Path;
 
 /// The service ids of bridges.
 pub(crate) const BRIDGE_SERVICES: RangeInclusive<u32> = 20..=99;
@@ -54,13 +53,6 @@ impl Bridge {
             Self::UxasSerial(bridge) => &bridge.common,
             Self::UxasZmq(bridge) => &bridge.common,
             Self::Dds(bridge) => &bridge.common,
-        }
-    }
-
-    /// Puts a directory before relative paths.
-    pub(crate) fn resolve(&mut self, base: &Path) {
-        if let Self::Dds(bridge) = self {
-            bridge.resolve(base);
         }
     }
 

@@ -51,6 +51,13 @@ pub(super) fn read_files(
             mistakes.push(located(&source, text, Mistake::Fault(fault)));
         }
     }
+    for (index, bridge) in config.bridges.iter_mut().enumerate() {
+        if let Bridge::Dds(dds) = bridge
+            && let Err(fault) = dds.read_types(base)
+        {
+            mistakes.push(located(&source, text, Mistake::Fault(fault.below(&format!("bridge.{index}")))));
+        }
+    }
     ConfigError::all(mistakes).map_or(Ok(()), Err)
 }
 

@@ -78,22 +78,16 @@ impl Topics {
 
 /// What the pattern of a name asks for.
 fn by_pattern(name: &str) -> Option<Qos> {
-<<<<<<< HEAD
-    let kept = |keep| Some(Qos { durability: Durability::TransientLocal, keep, samples_max: SAMPLES_MAX });
     if name.starts_with("dds::") {
         // Any other topic of a DDS domain: its own promises are kept there, on the way the newest of each instance is.
-        return kept(Keep::Last(1));
+        return Some(Qos {
+            durability: Durability::TransientLocal,
+            keep: Keep::Last(1),
+            samples_max: SAMPLES_MAX,
+        });
     }
-    let name = name.strip_prefix("UMAA::")?;
-    let name = name.strip_suffix("Type").unwrap_or(name);
-    if name.ends_with("LogReport") {
-        return Some(Qos { durability: Durability::Volatile, keep: Keep::All, samples_max: SAMPLES_MAX });
-    }
-    if name.ends_with("CommandStatus") {
-=======
     let (durability, keep) = match Pattern::of(name)? {
         Pattern::Log => (Durability::Volatile, Keep::All),
->>>>>>> types
         // No transition may be skipped.
         Pattern::Status => (Durability::TransientLocal, Keep::All),
         Pattern::Command | Pattern::Response | Pattern::Element | Pattern::State => {

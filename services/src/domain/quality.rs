@@ -61,7 +61,7 @@ pub(super) fn offer(config: &DomainConfig, topic: &str, readers: &[&Endpoint], x
 }
 
 /// In words, as DDS names it.
-pub(super) fn text(quality: &Quality) -> String {
+pub fn text(quality: &Quality) -> String {
     let mut words = vec![
         if quality.reliable { "RELIABLE" } else { "BEST_EFFORT" }.to_owned(),
         match quality.durable {

@@ -78,9 +78,8 @@ impl Routes {
 
     /// The routes that write a topic into the domain.
     pub(super) fn writing(&self, topic: &str) -> Vec<RouteId> {
-        let of_topic = |(id, route): (&RouteId, &Route)| {
-            (route.way == Way::Out && route.topic == topic).then_some(*id)
-        };
+        let of_topic =
+            |(id, route): (&RouteId, &Route)| (route.way == Way::Out && route.topic == topic).then_some(*id);
         self.routes.iter().filter_map(of_topic).collect()
     }
 

@@ -10,7 +10,6 @@
 
 import dataclasses
 import json
-import os
 import sys
 import threading
 import typing
@@ -23,13 +22,7 @@ from cyclonedds.sub import DataReader, Subscriber
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-import types as _standard  # noqa: E402  (the module of that name of the standard library stays what it is)
-import importlib.util  # noqa: E402
-
-spec = importlib.util.spec_from_file_location("umaa_types", os.path.join(os.path.dirname(__file__), "types.py"))
-umaa_types = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(umaa_types)
+from umaa_types import Types
 
 CONFIG = """<CycloneDDS><Domain><General><AllowMulticast>false</AllowMulticast><Interfaces>
 <NetworkInterface address="127.0.0.1"/></Interfaces></General><Discovery><ParticipantIndex>auto</ParticipantIndex>
@@ -129,7 +122,7 @@ class Peer:
     def kind(self, name):
         version, extensibility, topic = name.split(" ", 2)
         if (version, extensibility) not in self.known:
-            self.known[version, extensibility] = umaa_types.Types(version, extensibility)
+            self.known[version, extensibility] = Types(version, extensibility)
         return self.known[version, extensibility].topics[topic]
 
     def writer(self, topic, name, given):

@@ -8,7 +8,7 @@ use aldis_envelope::{Dialect, ServiceId, umaa};
 use aldis_services::domain::{Pattern, QualityRule};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -150,28 +150,63 @@ pub(crate) enum DdsVersion {
     V6_0,
 }
 
+/// Two libraries as one; where both have a name, the first counts.
+fn both(first: &Library, second: &Library) -> Result<Library, String> {
+    let mut draft = Draft::default();
+    let more = second.definitions().filter(|(name, _)| first.get(name).is_none());
+    for (name, definition) in first.definitions().chain(more) {
+        draft.add(name, definition.clone()).map_err(|error| error.to_string())?;
+    }
+    draft.finish().map_err(|errors| errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
+}
+
+/// The IDL files of a folder and those below it, by their paths from it.
+fn idl_files(root: &Path, folder: &Path, files: &mut BTreeMap<String, String>) -> std::io::Result<()> {
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.is_dir() {
+            idl_files(root, &path, files)?;
+        } else if path.extension().is_some_and(|extension| extension == "idl") {
+            let name = path.strip_prefix(root).unwrap_or(&path).display().to_string();
+            files.insert(name, std::fs::read_to_string(&path)?);
+        }
+    }
+    Ok(())
+}
+
 /// The type of `aldis bench dds`: a number as its key, and bytes.
 pub(crate) const BENCH_TYPE: &str = "aldis::Bench";
 
 /// Types with that of the measurement beside them.
-fn with_bench_type(library: Library) -> Library {
+fn with_bench_type(library: &Library) -> Library {
     let mut draft = Draft::default();
     let members = vec![
         Member::new(0, "key", Type::Int32).key(),
         Member::new(1, "payload", Type::sequence(Type::Octet, Some(1 << 16))),
     ];
     let bench = Structure { extensibility: Extensibility::Appendable, base: None, members };
-    let known = library.definitions().map(|(name, definition)| (name.to_owned(), definition.clone()));
-    let known: Vec<_> = known.chain([(BENCH_TYPE.to_owned(), Definition::Structure(bench))]).collect();
-    // What was sound stays so beside a type that needs nothing.
-    let added = known.into_iter().try_for_each(|(name, definition)| draft.add(name, definition));
-    added.ok().and_then(|()| draft.finish().ok()).unwrap_or(library)
+    let added = draft.add(BENCH_TYPE, Definition::Structure(bench)).ok();
+    let bench = added.and_then(|()| draft.finish().ok()).unwrap_or_default();
+    // What is sound stays so beside a type that needs nothing.
+    both(&bench, library).unwrap_or_default()
 }
 
 /// The type of `aldis bench dds` alone.
 #[cfg(feature = "dds")]
 pub(crate) fn bench_types() -> Arc<Library> {
-    Arc::new(with_bench_type(Library::default()))
+    Arc::new(with_bench_type(&Library::default()))
+}
+
+/// The types of both versions, and of a folder.
+#[cfg(feature = "dds")]
+pub(crate) fn dds_types(folder: Option<&Path>) -> Result<Arc<Library>, String> {
+    let (older, _) = built_in(DdsVersion::V5_2_1);
+    let Some(folder) = folder else { return Ok(older) };
+    let mut files = BTreeMap::new();
+    idl_files(folder, folder, &mut files).map_err(|why| format!("{}: {why}", folder.display()))?;
+    let idl = aldis_envelope::idl::parse(&files, Extensibility::Appendable);
+    let idl = idl.map_err(|errors| errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))?;
+    both(&idl.library, &older).map(Arc::new)
 }
 
 /// The types that every program knows. Those of the fleet's own version are messages of this project, member for member.
@@ -181,7 +216,7 @@ fn built_in(version: DdsVersion) -> (Arc<Library>, Arc<BTreeSet<String>>) {
         DdsVersion::V5_2_1 => {
             let topics = umaa::v5_2_1::described_topics().into_iter();
             let exact = topics.map(|topic| topic.type_name).collect();
-            (Arc::new(with_bench_type(umaa::v5_2_1::library().unwrap_or_default())), Arc::new(exact))
+            (Arc::new(with_bench_type(&umaa::v5_2_1::library().unwrap_or_default())), Arc::new(exact))
         }
         DdsVersion::V6_0 => (Arc::new(umaa::v6_0::library().unwrap_or_default()), Arc::default()),
     }
@@ -190,10 +225,34 @@ fn built_in(version: DdsVersion) -> (Arc<Library>, Arc<BTreeSet<String>>) {
 #[cfg_attr(not(feature = "dds"), allow(dead_code, reason = "no bridge is made of it then"))]
 impl Dds {
     /// Puts a directory before relative paths, and reads the types of the IDL folder.
-    pub(crate) fn resolve(&mut self, base: &Path) {
+    ///
+    /// # Errors
+    /// A folder that cannot be read, and every mistake in its files.
+    pub(crate) fn read_types(&mut self, base: &Path) -> Result<(), Fault> {
         for path in [&mut self.table.idl, &mut self.table.cyclonedds] {
             *path = path.take().map(|relative| base.join(relative));
         }
+        let Some(folder) = &self.table.idl else { return Ok(()) };
+        let fault = |what: String| {
+            Fault::new("idl", what, "give a folder of IDL files; `aldis idl check` says what is in it")
+        };
+        let mut files = BTreeMap::new();
+        idl_files(folder, folder, &mut files).map_err(|why| fault(format!("{}: {why}", folder.display())))?;
+        let idl = aldis_envelope::idl::parse(&files, Extensibility::Appendable);
+        let idl = idl.map_err(|errors| {
+            fault(errors.iter().take(8).map(ToString::to_string).collect::<Vec<_>>().join("; "))
+        })?;
+        // What the folder describes counts before what is built in.
+        let added = both(&idl.library, &self.types);
+        self.exact = Arc::new(
+            self.exact
+                .iter()
+                .filter(|name| idl.library.get(name).is_none_or(|own| self.types.get(name) == Some(own)))
+                .cloned()
+                .collect(),
+        );
+        self.types = Arc::new(added.map_err(fault)?);
+        Ok(())
     }
 
     /// Patterns of topics that cross, and of those that do not.
