@@ -18,12 +18,12 @@ mod tests;
 pub use config::{DomainConfig, Pattern, QualityRule};
 pub use presence::mark;
 pub use quality::text as quality_in_words;
-pub use report::{DOMAIN_QUERY, DOMAIN_STATUS, DomainStatus, RouteStatus};
+pub use report::{DomainStatus, RouteStatus};
 
 use crate::counters::counters;
 use crate::service::domain::{Arrival, DomainEvent, DomainGuid, Endpoint, RouteId};
 use crate::service::{Input, Level, Outbox, Service};
-use aldis_envelope::{Now, Prefix, Refusal};
+use aldis_envelope::{Now, Prefix, Refusal, aldis};
 use forms::Forms;
 use incoming::Registered;
 use outgoing::Written;
@@ -216,7 +216,7 @@ impl Service for Domain {
         match input {
             Input::Domain(event) => self.domain(event, out),
             Input::Message(envelope) if envelope.message.call.is_some() => {
-                if envelope.message.label.descriptor() == DOMAIN_QUERY {
+                if envelope.message.label.descriptor() == aldis::DOMAIN_QUERY {
                     self.report(envelope, out);
                 } else {
                     let what = envelope.message.label.descriptor().to_owned();

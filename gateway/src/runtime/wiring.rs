@@ -67,7 +67,7 @@ pub(crate) enum OutsideError {
     Key(#[from] config::KeyError),
     /// A configuration of Cyclone DDS.
     #[cfg(feature = "dds")]
-    #[error("{0}: {1}")]
+    #[error("{}: {1}", .0.display())]
     CycloneDds(PathBuf, std::io::Error),
 }
 

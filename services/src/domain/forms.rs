@@ -106,16 +106,15 @@ impl Form {
                 Ok(Some(message.content.clone()))
             }
             ContentType::Cdr => {
-                let sample = self.foreign().read(&message.content)?;
+                let sample = self.schema.read(&message.content)?;
+                if sample.differs {
+                    // Written anew it would lose what its type has more.
+                    return Ok(None);
+                }
                 self.schema.write(&sample.value, representation).map(|cdr| Some(cdr.into()))
             }
             _ => Ok(None),
         }
-    }
-
-    /// The type as the other side may have it.
-    fn foreign(&self) -> &Schema {
-        &self.schema
     }
 
     /// The key of a message's instance, as a sample that holds it alone.

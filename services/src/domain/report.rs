@@ -6,11 +6,6 @@ use crate::service::Outbox;
 use aldis_envelope::{ContentType, Envelope, Name, aldis};
 use serde::{Deserialize, Serialize};
 
-/// Asks a bridge to a domain what it bridges.
-pub const DOMAIN_QUERY: &str = "aldis.DomainQuery";
-/// Its answer, a [`DomainStatus`].
-pub const DOMAIN_STATUS: &str = "aldis.DomainStatus";
-
 /// What a bridge to a domain says of itself.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DomainStatus {
@@ -49,7 +44,7 @@ pub struct RouteStatus {
 
 impl Domain {
     pub(super) fn report(&self, request: &Envelope, out: &mut Outbox) {
-        let Ok(name) = Name::new(DOMAIN_STATUS) else { return };
+        let Ok(name) = Name::new(aldis::DOMAIN_STATUS) else { return };
         out.reply(request, ContentType::Aldis, name, aldis::encode(&self.status()).into(), true);
     }
 

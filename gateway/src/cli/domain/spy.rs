@@ -176,7 +176,7 @@ impl Watching {
             ..Qos::default()
         };
         let (tell, name) = (self.tell.clone(), endpoint.topic.clone());
-        let receive = move |incoming| tell.send(News::Arrived(name.clone(), incoming)).is_ok();
+        let receive = move |incoming: Incoming| tell.send(News::Arrived(name.clone(), incoming)).is_ok();
         Reader::new(&topic, &qos, Box::new(receive), Box::new(|_| ())).map_err(|why| why.to_string())
     }
 

@@ -4,8 +4,9 @@ use crate::cli::exit::Failure;
 use crate::cli::link::ask_service;
 use crate::cli::member::Join;
 use crate::cli::print_line;
+use aldis_envelope::aldis::DOMAIN_QUERY;
 use aldis_envelope::{EntityId, ServiceId, Source};
-use aldis_services::domain::{DOMAIN_QUERY, DomainStatus, RouteStatus};
+use aldis_services::domain::{DomainStatus, RouteStatus};
 use serde_json::json;
 
 /// Show the routes of a bridge, with both sides' quality of service.

@@ -2,8 +2,8 @@
 
 use crate::config::{Bridge, Config, Dds};
 use aldis_envelope::Source;
-use aldis_services::ServiceSpec;
 use aldis_services::domain::{Domain, DomainConfig};
+use aldis_services::{Service, ServiceSpec};
 use std::sync::Arc;
 
 fn domains(config: &Config) -> impl Iterator<Item = &Dds> {
@@ -36,7 +36,7 @@ pub(super) fn services(config: &Config) -> Vec<ServiceSpec> {
         ServiceSpec {
             source: source(config, dds),
             name: dds.common.name.as_str().to_owned(),
-            factory: Arc::new(move || Box::new(Domain::new(domain.clone()))),
+            factory: Arc::new(move || -> Box<dyn Service> { Box::new(Domain::new(domain.clone())) }),
         }
     };
     domains(config).map(spec).collect()
