@@ -16,6 +16,8 @@ pub use error::{DescriptionError, Fault};
 pub use key::KeyMember;
 pub use library::{Draft, Library, Resolved};
 
+use std::fmt;
+
 /// The deepest nesting of types: far above any type of UMAA, and low enough that no walk runs out of stack.
 pub const DEPTH_MAX: usize = 64;
 
@@ -93,6 +95,43 @@ impl Type {
             Self::Int64 | Self::UInt64 | Self::Float64 => Some(8),
             _ => None,
         }
+    }
+}
+
+/// The type as IDL writes it.
+impl fmt::Display for Type {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let bounded = |f: &mut fmt::Formatter<'_>, name: &str, bound: &Option<u32>| match bound {
+            Some(bound) => write!(f, "{name}<{bound}>"),
+            None => f.write_str(name),
+        };
+        f.write_str(match self {
+            Self::Boolean => "boolean",
+            Self::Octet => "octet",
+            Self::Char8 => "char",
+            Self::Char16 => "wchar",
+            Self::Int8 => "int8",
+            Self::UInt8 => "uint8",
+            Self::Int16 => "short",
+            Self::UInt16 => "unsigned short",
+            Self::Int32 => "long",
+            Self::UInt32 => "unsigned long",
+            Self::Int64 => "long long",
+            Self::UInt64 => "unsigned long long",
+            Self::Float32 => "float",
+            Self::Float64 => "double",
+            Self::Named(name) => name,
+            Self::String { bound } => return bounded(f, "string", bound),
+            Self::WideString { bound } => return bounded(f, "wstring", bound),
+            Self::Sequence { element, bound: None } => return write!(f, "sequence<{element}>"),
+            Self::Sequence { element, bound: Some(bound) } => {
+                return write!(f, "sequence<{element}, {bound}>");
+            }
+            Self::Array { element, dimensions } => {
+                write!(f, "{element}")?;
+                return dimensions.iter().try_for_each(|length| write!(f, "[{length}]"));
+            }
+        })
     }
 }
 

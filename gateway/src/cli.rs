@@ -14,6 +14,7 @@ mod domain;
 mod exit;
 mod fleet;
 mod health;
+mod idl;
 mod link;
 mod lmcp;
 mod log;
@@ -96,6 +97,8 @@ enum Command {
     Health(health::HealthArgs),
     /// Show the log that a node keeps of the fleet.
     Log(log::LogArgs),
+    /// Read folders of IDL: topics, types, keys, or what is wrong.
+    Idl(idl::IdlArgs),
     /// Read, write and check LMCP messages in files.
     Lmcp(lmcp::Lmcp),
     /// Say which vehicle does which task, in which way and order.
@@ -144,6 +147,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Replay(args) => args.run(),
         Command::Health(args) => args.run(),
         Command::Log(args) => args.run(),
+        Command::Idl(args) => args.run(),
         Command::Lmcp(args) => args.run(),
         Command::Assign(args) => args.run(),
         Command::Route(args) => args.run(),

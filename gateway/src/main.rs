@@ -8,6 +8,7 @@ mod carrier;
 mod cli;
 mod clock;
 mod config;
+mod idl_folder;
 mod journal;
 mod runtime;
 

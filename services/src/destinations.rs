@@ -3,8 +3,9 @@
 //! A GUID that this fleet has made tells its service itself. Every other is learned: whoever sends a sample with it as its
 //! `source` is where commands to it must go.
 
+use crate::dds::Pattern;
 use aldis_envelope::umaa::{self, CommandKey, Key};
-use aldis_envelope::{ContentType, EntityId, Guid, Guids, KeyHash, Message};
+use aldis_envelope::{ContentType, EntityId, Fleet, Guid, GuidForm, Guids, Instance, KeyHash, Message};
 use std::collections::BTreeMap;
 
 /// How many GUIDs are remembered: far more than there are services in a fleet, and 4 MB at the most.
@@ -32,18 +33,19 @@ impl Destination {
 }
 
 /// What has been learned.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Destinations {
-    guids: Option<Guids>,
+    guids: Guids,
     learned: BTreeMap<Guid, EntityId>,
     /// Instances whose source is known already, each with its entity, so that a stream of samples is read once.
     read: BTreeMap<KeyHash, EntityId>,
 }
 
 impl Destinations {
-    /// Nothing learned yet; GUIDs of the own fleet are read by `guids`, where it makes readable ones.
-    pub fn new(guids: Option<Guids>) -> Self {
-        Self { guids, ..Self::default() }
+    /// Nothing learned yet; readable GUIDs of the own fleet are read.
+    pub fn new(fleet: &Fleet) -> Self {
+        let guids = Guids::new(fleet, GuidForm::Readable);
+        Self { guids, learned: BTreeMap::new(), read: BTreeMap::new() }
     }
 
     /// Learns that an entity speaks as a GUID. What it spoke as last counts: a service may move.
@@ -76,27 +78,32 @@ impl Destinations {
 
     /// The entity that a GUID belongs to.
     pub fn of(&self, guid: Guid) -> Option<EntityId> {
-        let own = self.guids.as_ref().and_then(|guids| guids.service(guid)).map(|source| source.entity);
+        let own = self.guids.service(guid).map(|source| source.entity);
         own.or_else(|| self.learned.get(&guid).copied())
     }
 
     /// Where a message goes: a command, also the dispose that cancels it, towards its destination.
     pub fn of_message(&self, message: &Message) -> Destination {
-        let topic = umaa::topic(message.label.descriptor());
-        let is_command = topic.is_some_and(|topic| topic.key_members == CommandKey::MEMBERS);
-        if !is_command || message.label.attributes.content_type != ContentType::Umaa {
+        let descriptor = message.label.descriptor();
+        if Pattern::of(descriptor) != Some(Pattern::Command) {
             return Destination::Everybody;
         }
-        let told = topic.and_then(|topic| topic.destination(&message.content));
-        let of_key = || {
-            let key = CommandKey::of_instance(message.instance.as_deref()?)?;
-            Some(key.destination)
-        };
-        match told.or_else(of_key) {
+        let told = || umaa::topic(descriptor)?.destination(&message.content);
+        let guid = message.instance.as_deref().and_then(of_key).or_else(told);
+        match guid {
             Some(guid) => self.of(guid).map_or(Destination::Unknown(guid), Destination::Entity),
             None => Destination::Everybody,
         }
     }
+}
+
+/// The destination in a command's key: GUIDs in 5.2.1; in 6.0 source and destination have their parents behind them.
+fn of_key(instance: &Instance) -> Option<Guid> {
+    if let Some(key) = CommandKey::of_instance(instance) {
+        return Some(key.destination);
+    }
+    let key: &[u8; 80] = instance.key.as_deref()?.try_into().ok()?;
+    key[48..].first_chunk().copied().map(Guid)
 }
 
 #[cfg(test)]
@@ -105,7 +112,7 @@ mod tests {
     use aldis_envelope::umaa::{
         CommandHeader, LogLevel, LogReport, LongDescription, ResourceAllocationCommand,
     };
-    use aldis_envelope::{DateTime, Fleet, GuidForm, ServiceId, Source};
+    use aldis_envelope::{DateTime, ServiceId, Source};
 
     fn entity(number: u64) -> EntityId {
         EntityId::new(number).unwrap()
@@ -143,7 +150,7 @@ mod tests {
 
     #[test]
     fn a_command_goes_where_its_destination_has_spoken_from() {
-        let mut known = Destinations::new(None);
+        let mut known = Destinations::new(&Fleet::new("blue").unwrap());
         let guid = Guid([7; 16]);
         let where_to = |known: &Destinations| command(guid).map(|message| known.of_message(&message));
         assert_eq!(where_to(&known), [Destination::Unknown(guid); 2]);
@@ -152,19 +159,25 @@ mod tests {
         known.hear(&log(guid, 500));
         assert_eq!(where_to(&known)[0].entity(), Some(entity(500)), "a service that moved is found");
         assert_eq!(known.of_message(&log(guid, 1)), Destination::Everybody);
+        // A command of 6.0, which is carried as it came: source with parent, session, destination with parent.
+        let [mut newer, _] = command(guid);
+        let key = [[1; 16], [9; 16], [2; 16], guid.0, [9; 16]].concat();
+        newer.instance =
+            Some(std::sync::Arc::new(Instance::of_key(key.into(), aldis_envelope::KeyWidth::Wider)));
+        assert_eq!(known.of_message(&newer), Destination::Entity(entity(500)));
     }
 
     #[test]
     fn guids_of_the_own_fleet_need_not_be_learned() {
         let guids = Guids::new(&Fleet::new("blue").unwrap(), GuidForm::Readable);
-        let known = Destinations::new(Some(guids));
+        let known = Destinations::new(&Fleet::new("blue").unwrap());
         assert_eq!(known.of(guids.of_service(service(400))), Some(entity(400)));
         assert_eq!(known.of(Guid([7; 16])), None);
     }
 
     #[test]
     fn memory_is_bounded() {
-        let mut known = Destinations::new(None);
+        let mut known = Destinations::new(&Fleet::new("blue").unwrap());
         for number in 0..=GUIDS_MAX as u128 {
             known.learn(Guid(number.to_be_bytes()), entity(1));
         }

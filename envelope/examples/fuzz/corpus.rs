@@ -1,7 +1,11 @@
 //! Sound inputs: objects of all types in each form, headers, frames.
 
+use crate::samples;
+use aldis_envelope::codec::cdr::Schema;
 use aldis_envelope::codec::{native, stream};
+use aldis_envelope::description::DescriptionError;
 use aldis_envelope::lmcp::{Kind, Object, Slot, TypeInfo, descendants, encode, to_json, to_xml, types};
+use aldis_envelope::umaa::{v5_2_1, v6_0};
 use aldis_envelope::{
     Address, BootId, Call, CallId, ContentType, Descriptor, Dialect, EntityId, Envelope, Label, Message,
     Priority, Role, ServiceId, Source, Stamp, Wall,
@@ -28,6 +32,8 @@ pub(crate) struct Corpus {
     pub(crate) headers: Vec<Vec<u8>>,
     pub(crate) delimited: Vec<Vec<u8>>,
     pub(crate) frames: Vec<Vec<u8>>,
+    pub(crate) cdr: Vec<Vec<u8>>,
+    pub(crate) idl: Vec<Vec<u8>>,
 }
 
 impl Corpus {
@@ -63,8 +69,27 @@ impl Corpus {
             }
             corpus.frames.push(frames);
         }
+        corpus.cdr = samples::samples(&mut random, &schemas()?)?;
+        corpus.idl = vec![samples::IDL.as_bytes().to_vec()];
         Ok(corpus)
     }
+}
+
+/// Every topic of Support Operations in both versions, appendable and final.
+pub(crate) fn schemas() -> Result<Vec<Schema>, Box<dyn Error>> {
+    let unsound = |errors: Vec<DescriptionError>| format!("{errors:?}");
+    let versions = [
+        (v5_2_1::library().map_err(unsound)?, v5_2_1::described_topics()),
+        (v6_0::library().map_err(unsound)?, v6_0::topics()),
+    ];
+    let mut schemas = Vec::new();
+    for (library, topics) in &versions {
+        for topic in topics {
+            let schema = Schema::new(library, &topic.type_name)?;
+            schemas.extend([schema.as_final(), schema]);
+        }
+    }
+    Ok(schemas)
 }
 
 fn dialect(random: &mut Rng) -> Dialect {

@@ -1,7 +1,10 @@
 //! What is fed: each decoder of this crate, with what holds when it accepts an input.
 
-use crate::corpus::Corpus;
+use crate::corpus::{Corpus, schemas};
+use aldis_envelope::codec::cdr::{KeySchema, Schema};
 use aldis_envelope::codec::{delimited, multipart, native, stream};
+use aldis_envelope::description::Extensibility;
+use aldis_envelope::idl;
 use aldis_envelope::lmcp::{self, Header, natural_key, position};
 use aldis_envelope::{Fleet, Keys};
 use bytes::Bytes;
@@ -31,7 +34,7 @@ pub(crate) struct Decoder {
     pub(crate) read: fn(&[u8], &mut Watch<'_>) -> Outcome,
 }
 
-pub(crate) const DECODERS: [Decoder; 7] = [
+pub(crate) const DECODERS: [Decoder; 9] = [
     Decoder { name: "lmcp", samples: |it| &it.lmcp, mend: Some(mend_lmcp), read: read_lmcp },
     Decoder { name: "native", samples: |it| &it.headers, mend: None, read: read_native },
     Decoder { name: "delimited", samples: |it| &it.delimited, mend: None, read: read_delimited },
@@ -39,6 +42,8 @@ pub(crate) const DECODERS: [Decoder; 7] = [
     Decoder { name: "stream", samples: |it| &it.frames, mend: None, read: read_stream },
     Decoder { name: "json", samples: |it| &it.json, mend: None, read: read_json },
     Decoder { name: "xml", samples: |it| &it.xml, mend: None, read: read_xml },
+    Decoder { name: "cdr", samples: |it| &it.cdr, mend: None, read: read_cdr },
+    Decoder { name: "idl", samples: |it| &it.idl, mend: None, read: read_idl },
 ];
 
 /// Size and checksum of the container, of seven inputs in eight.
@@ -160,4 +165,41 @@ fn as_long_as(text: String, input: &[u8]) -> Vec<u8> {
 fn comes_back(object: &dyn lmcp::Object, again: Option<Box<dyn lmcp::Object>>) -> Outcome {
     let same = again.is_some_and(|again| format!("{again:?}") == format!("{object:?}"));
     if same { Outcome::Accepted } else { Outcome::Misread }
+}
+
+thread_local! {
+    static SCHEMAS: Vec<Schema> = schemas().unwrap_or_default();
+}
+
+/// The first byte chooses the type, the rest is the sample. What was read is written and read again.
+fn read_cdr(input: &[u8], watch: &mut Watch<'_>) -> Outcome {
+    let Some((chosen, sample)) = input.split_first() else { return Outcome::Refused };
+    SCHEMAS.with(|schemas| {
+        let Some(schema) = schemas.get(usize::from(*chosen) % schemas.len().max(1)) else {
+            return Outcome::Misread;
+        };
+        let mut read = None;
+        watch(&mut || read = schema.read(sample).ok());
+        let _ = (
+            schema.to_postcard(sample),
+            KeySchema::new(schema).map(|keys| keys.of_key_sample(sample).is_ok()),
+        );
+        let Some(read) = read else { return Outcome::Refused };
+        if read.differs {
+            return Outcome::Accepted;
+        }
+        // Compared as bytes: a NaN is not equal to itself.
+        let again = schema.write(&read.value, read.representation).ok();
+        let second = again.as_deref().and_then(|again| schema.read(again).ok());
+        let second = second.and_then(|second| schema.write(&second.value, second.representation).ok());
+        if again.is_some() && again == second { Outcome::Accepted } else { Outcome::Misread }
+    })
+}
+
+fn read_idl(input: &[u8], watch: &mut Watch<'_>) -> Outcome {
+    let text = String::from_utf8_lossy(input).into_owned();
+    let files = [("a.idl".to_owned(), text)].into();
+    let mut read = false;
+    watch(&mut || read = idl::parse(&files, Extensibility::Appendable).is_ok());
+    if read { Outcome::Accepted } else { Outcome::Refused }
 }

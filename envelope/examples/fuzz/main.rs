@@ -14,6 +14,7 @@
 mod corpus;
 mod decoders;
 mod mutate;
+mod samples;
 
 use corpus::Corpus;
 use decoders::{DECODERS, Decoder, Outcome};

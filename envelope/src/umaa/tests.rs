@@ -312,3 +312,22 @@ fn an_element_has_a_topic_of_its_own() {
     assert_eq!((message.change, message.content.len()), (Change::Dispose, 0));
     assert_eq!(message.instance.unwrap().key.as_deref(), Some(&[2; 16][..]));
 }
+
+#[test]
+fn descriptions_of_both_versions_are_sound_and_agree_with_the_types() {
+    let library = v5_2_1::library().unwrap();
+    for info in topics() {
+        let keys: Vec<_> = library.key_members(info.type_name).into_iter().map(|key| key.path).collect();
+        assert_eq!(keys, info.key_members, "{}", info.name);
+        assert_eq!(info.type_name, format!("{}Type", info.name));
+    }
+    let newer = v6_0::library().unwrap();
+    let keys = |name: &str| newer.key_members(name).into_iter().map(|key| key.path).collect::<Vec<_>>();
+    let health = keys("UMAA::SO::HealthReport::HealthReportType");
+    assert_eq!(health, ["source.id", "source.parentID", "code", "resourceID.id", "resourceID.parentID"]);
+    assert_eq!(keys(v6_0::RESOURCES_ELEMENT), ["setID", "elementID"]);
+    let status = newer.structure("UMAA::SO::HealthReport::HealthReportType").unwrap().members[2].clone();
+    assert_eq!((status.name.as_str(), status.optional, status.id), ("status", true, 2));
+    assert_eq!(v6_0::topics().len(), topics().count() + 1);
+    assert!(v6_0::topics().iter().all(|topic| newer.structure(&topic.type_name).is_some()));
+}

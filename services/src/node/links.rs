@@ -9,16 +9,13 @@ mod services;
 mod tickets;
 
 use super::{Node, Origin};
+use crate::destinations::{Destination, Destinations};
 use crate::event::{Effect, LinkEvent, LinkId, Place};
 use crate::link::{
     self, BatchId, CarrierId, Link, LinkSpec, Offer, Record, Ticket, TicketState, record_prefix,
 };
 use crate::service::Level;
-use aldis_envelope::umaa::{CommandKey, Key};
-use aldis_envelope::{
-    Address, CallId, EntityId, Envelope, Fleet, GuidForm, Guids, Label, Message, Monotonic, Now, Prefix,
-    Source,
-};
+use aldis_envelope::{Address, CallId, EntityId, Envelope, Fleet, Label, Monotonic, Now, Prefix, Source};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
@@ -70,7 +67,8 @@ struct Caller {
 /// All links of the node.
 pub(super) struct Links {
     all: Vec<Attached>,
-    guids: [Guids; 2],
+    /// Where commands go.
+    destinations: Destinations,
     /// Whether the node has a journal.
     journaled: bool,
     /// Some link has something to do.
@@ -107,7 +105,7 @@ impl Links {
         };
         Self {
             all: specs.iter().map(attach).collect(),
-            guids: [GuidForm::Readable, GuidForm::V5].map(|form| Guids::new(fleet, form)),
+            destinations: Destinations::new(fleet),
             journaled,
             due: false,
             services_changed: !specs.is_empty(),
@@ -160,16 +158,6 @@ impl Links {
     fn give(&mut self, place: usize, event: link::Event) {
         self.all[place].events.push(event);
         self.due = true;
-    }
-
-    /// The entity that a message's content is for, where it can be told: a UMAA command names its provider in its key.
-    fn destination(&self, message: &Message) -> Option<EntityId> {
-        let topic = message.label.descriptor().strip_prefix("UMAA::")?;
-        if !topic.trim_end_matches("Type").ends_with("Command") {
-            return None;
-        }
-        let CommandKey { destination, .. } = CommandKey::of_instance(message.instance.as_deref()?)?;
-        self.guids.iter().find_map(|guids| guids.service(destination)).map(|source| source.entity)
     }
 }
 
@@ -276,12 +264,18 @@ impl Node {
         envelope: &Envelope,
         effects: &mut Vec<Effect>,
     ) {
+        self.links.destinations.hear(&envelope.message);
         if origin == Origin::Link(id) {
             return;
         }
-        let destination = self.links.destination(&envelope.message);
+        let destination = self.links.destinations.of_message(&envelope.message);
+        if let Destination::Unknown(guid) = destination {
+            let kind = format!("unknown destination {guid}");
+            let text = format!("a command to {guid}, which nobody has spoken as: it goes to every peer");
+            self.say(now, Level::Information, &kind, text, effects);
+        }
         let attached = &mut self.links.all[id.0];
-        let Ok(treatment) = attached.spec.export.treat(rule, envelope, destination) else { return };
+        let Ok(treatment) = attached.spec.export.treat(rule, envelope, destination.entity()) else { return };
         let mut envelope = envelope.clone();
         envelope.stamp.lifespan_left_ms = treatment.lifespan_left_ms;
         let ticket = attached.ticket(origin, &envelope);

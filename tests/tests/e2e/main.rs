@@ -6,6 +6,7 @@ mod access;
 mod allocation;
 mod calls;
 mod foreign;
+mod idl;
 mod journal;
 mod link;
 mod lmcp;

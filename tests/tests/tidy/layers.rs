@@ -15,8 +15,8 @@ const PACKAGES: [(&str, &[&str]); 3] = [
 /// circle can be.
 const LAYERS: [&[&str]; 9] = [
     &["journal", "service"],
-    &["allow", "calls", "counters", "dds", "destinations", "notes", "streams"],
-    &["link", "map", "plan", "umaa"],
+    &["allow", "calls", "counters", "dds", "notes", "streams"],
+    &["destinations", "link", "map", "plan", "umaa"],
     &["event"],
     &["bridge", "labels"],
     &["conform", "domain", "health", "log", "manager", "player", "track", "uxas"],

@@ -99,6 +99,15 @@ impl KeySchema {
         Ok(self.normal.json(&self.value(key)?))
     }
 
+    /// A value of the type in which nothing but the key is there, from the key of an instance.
+    ///
+    /// # Errors
+    /// [`CdrError`] where the key is not one of the type.
+    pub fn partial(&self, schema: &Schema, key: &[u8]) -> Result<Value, Box<CdrError>> {
+        let key = self.value(key)?;
+        Ok(spread((&self.normal, self.normal.root), (schema, schema.root), &key))
+    }
+
     fn value(&self, key: &[u8]) -> Read<Value> {
         let mut tree = Tree::default();
         let mut reader = Reader::new(&self.normal, Cursor::new(key, HASHED), &mut tree);
@@ -132,5 +141,20 @@ fn picked(from: (&Schema, NodeId), to: (&Schema, NodeId), value: &Value) -> Resu
         }
         (Node::Structure(_), Node::Structure(_), _) => Err(CdrFault::OtherKind { expected: "a structure" }),
         _ => Ok(value.clone()),
+    }
+}
+
+/// The members of a key in a value of the whole type, all others absent.
+fn spread(from: (&Schema, NodeId), to: (&Schema, NodeId), value: &Value) -> Value {
+    match (&from.0.nodes[from.1], &to.0.nodes[to.1], value) {
+        (Node::Structure(source), Node::Structure(wanted), Value::Structure(members)) => {
+            let spread = wanted.members.iter().map(|field| {
+                let place = source.members.iter().position(|known| known.id == field.id)?;
+                let held = members.get(place)?.as_ref()?;
+                Some(spread((from.0, source.members[place].node), (to.0, field.node), held))
+            });
+            Value::Structure(spread.collect())
+        }
+        _ => value.clone(),
     }
 }

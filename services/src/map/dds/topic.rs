@@ -130,6 +130,11 @@ pub enum ExportError {
     },
 }
 
+/// Says of which topic a sample is malformed.
+pub(super) fn malformed(topic: &str) -> impl Fn(Box<CdrError>) -> ImportError {
+    move |why| ImportError::Malformed { topic: topic.to_owned(), why }
+}
+
 /// A type as it is written on the bus: appendable or final.
 #[derive(Debug, Clone)]
 struct Shape {
@@ -219,10 +224,10 @@ impl TopicMap {
     }
 
     fn sample(&self, bytes: &Bytes) -> Result<(Arc<Label>, Option<Instance>, Bytes), ImportError> {
-        let malformed = |why| ImportError::Malformed { topic: self.name.clone(), why };
+        let malformed = malformed(&self.name);
         let Some(shape) = self.shape_of(bytes) else { return Ok((self.theirs.clone(), None, bytes.clone())) };
         if let Some(info) = self.info {
-            let content = shape.schema.to_postcard(bytes).map_err(malformed)?;
+            let content = shape.schema.to_postcard(bytes).map_err(&malformed)?;
             // A value outside its range makes no content of ours; as it came, nothing of it is lost.
             if let Some((content, key)) = content.and_then(|content| {
                 let key = info.key(&content).ok()?;
@@ -248,7 +253,7 @@ impl TopicMap {
     fn key(&self, bytes: &Bytes) -> Result<Instance, ImportError> {
         let unknown = || ImportError::UnknownType { topic: self.name.clone() };
         let keys = self.shape_of(bytes).and_then(|shape| shape.keys.as_ref()).ok_or_else(unknown)?;
-        keys.of_key_sample(bytes).map_err(|why| ImportError::Malformed { topic: self.name.clone(), why })
+        keys.of_key_sample(bytes).map_err(malformed(&self.name))
     }
 
     fn remembered(&self, hash: KeyHash) -> Result<Instance, ImportError> {

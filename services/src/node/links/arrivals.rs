@@ -31,6 +31,7 @@ impl Node {
             self.say(now, Level::Warning, "refused at a link", text, effects);
         } else {
             self.counters.imported_by_links += 1;
+            self.links.destinations.hear(&envelope.message);
             self.import_by_link(now, place, envelope, effects);
             self.settle(now, effects);
         }
