@@ -174,9 +174,8 @@ fn take(reader: &Entity, mut each: impl FnMut(*mut std::os::raw::c_void, bool)) 
         // SAFETY: the infos are numbers, for which zero is valid.
         let mut infos: [dds_sample_info_t; AT_ONCE] = unsafe { std::mem::zeroed() };
         // SAFETY: both arrays have the length that is said; the first is null, so that samples are lent.
-        let count = unsafe {
-            dds_take(reader.0, samples.as_mut_ptr(), infos.as_mut_ptr(), AT_ONCE, AT_ONCE as u32)
-        };
+        let count =
+            unsafe { dds_take(reader.0, samples.as_mut_ptr(), infos.as_mut_ptr(), AT_ONCE, AT_ONCE as u32) };
         let count = check("dds_take", || "a built-in topic".into(), count)? as usize;
         for (sample, info) in samples.iter().zip(&infos).take(count) {
             let is_alive = info.valid_data && info.instance_state == dds_instance_state_DDS_IST_ALIVE;

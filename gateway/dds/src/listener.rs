@@ -71,7 +71,11 @@ impl Listener {
 
 /// # Safety
 /// The argument is a living [`Callbacks`].
-unsafe extern "C" fn offered(_: dds_entity_t, status: dds_offered_incompatible_qos_status_t, argument: *mut c_void) {
+unsafe extern "C" fn offered(
+    _: dds_entity_t,
+    status: dds_offered_incompatible_qos_status_t,
+    argument: *mut c_void,
+) {
     // SAFETY: as above.
     unsafe { mismatch(argument, status.total_count, status.last_policy_id) };
 }

@@ -2,7 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use super::*;
-use aldis_envelope::description::{Definition, Draft, Enumeration, Extensibility, Library, Member, Structure, Type};
+use aldis_envelope::description::{
+    Definition, Draft, Enumeration, Extensibility, Library, Member, Structure, Type,
+};
 use bytes::Bytes;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -283,7 +285,10 @@ fn errors_name_the_call_and_the_cause() {
     assert_eq!(unknown.to_string(), "dds_dynamic_type_create of T::Nothing: it is not described");
     let zero = Topic::new(&participant, "a\0b", described(&library, "T::Plain")).unwrap_err();
     assert!(zero.to_string().contains("it holds a zero byte"), "{zero}");
-    let other = ParticipantConfig { xml: Some("<CycloneDDS/>".into()), ..ParticipantConfig::new(participant.domain()) };
+    let other = ParticipantConfig {
+        xml: Some("<CycloneDDS/>".into()),
+        ..ParticipantConfig::new(participant.domain())
+    };
     let taken = Participant::open(&other).unwrap_err();
     assert!(taken.to_string().contains("another configuration"), "{taken}");
     let topic = Topic::new(&participant, "Plain", described(&library, "T::Plain")).unwrap();

@@ -82,8 +82,13 @@ impl Topic {
             if !told {
                 given.m_flagset &= !DDS_TOPIC_XTYPES_METADATA;
             }
-            let handle =
-                dds_create_topic(participant.entity().0, &given, c_name.as_ptr(), std::ptr::null(), std::ptr::null());
+            let handle = dds_create_topic(
+                participant.entity().0,
+                &given,
+                c_name.as_ptr(),
+                std::ptr::null(),
+                std::ptr::null(),
+            );
             let type_name = std::ffi::CStr::from_ptr(given.m_typename).to_string_lossy().into_owned();
             (handle, if given.m_nops > 0 { *given.m_ops } else { 0 }, type_name)
         };

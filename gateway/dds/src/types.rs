@@ -98,16 +98,18 @@ impl<'a> Builder<'a> {
             None => Err(DdsError::new("dds_dynamic_type_create", name, "it is not described")),
         }
     }
-    }
 
     fn define(&mut self, name: &'a str, definition: &'a Definition, top: bool) -> Result<Held, DdsError> {
         match definition {
             Definition::Alias(other) => {
                 let other = self.spec(other)?;
-                self.create(name, descriptor(dds_dynamic_type_kind_DDS_DYNAMIC_ALIAS), |d| d.base_type = other)
+                self.create(name, descriptor(dds_dynamic_type_kind_DDS_DYNAMIC_ALIAS), |d| {
+                    d.base_type = other
+                })
             }
             Definition::Enumeration(e) => {
-                let mut held = self.create(name, descriptor(dds_dynamic_type_kind_DDS_DYNAMIC_ENUMERATION), |_| ())?;
+                let mut held =
+                    self.create(name, descriptor(dds_dynamic_type_kind_DDS_DYNAMIC_ENUMERATION), |_| ())?;
                 self.extensible(name, &mut held, e.extensibility)?;
                 bits(name, &mut held, e.bit_bound)?;
                 for (literal, value) in &e.literals {
@@ -124,7 +126,8 @@ impl<'a> Builder<'a> {
                 Ok(held)
             }
             Definition::Bitmask(b) => {
-                let mut held = self.create(name, descriptor(dds_dynamic_type_kind_DDS_DYNAMIC_BITMASK), |_| ())?;
+                let mut held =
+                    self.create(name, descriptor(dds_dynamic_type_kind_DDS_DYNAMIC_BITMASK), |_| ())?;
                 self.extensible(name, &mut held, b.extensibility)?;
                 bits(name, &mut held, b.bit_bound)?;
                 for (flag, place) in &b.flags {
@@ -150,7 +153,8 @@ impl<'a> Builder<'a> {
             Definition::Union(union) => {
                 let discriminator = self.spec(&union.discriminator)?;
                 let kind = dds_dynamic_type_kind_DDS_DYNAMIC_UNION;
-                let mut held = self.create(name, descriptor(kind), |d| d.discriminator_type = discriminator)?;
+                let mut held =
+                    self.create(name, descriptor(kind), |d| d.discriminator_type = discriminator)?;
                 self.extensible(name, &mut held, union.extensibility)?;
                 nested(name, &mut held, !top)?;
                 for case in &union.cases {
@@ -168,7 +172,11 @@ impl<'a> Builder<'a> {
         // SAFETY: the type is a structure under construction, and the member was added by this id.
         unsafe {
             if member.key {
-                check("dds_dynamic_member_set_key", what, dds_dynamic_member_set_key(&mut held.0, member.id, true))?;
+                check(
+                    "dds_dynamic_member_set_key",
+                    what,
+                    dds_dynamic_member_set_key(&mut held.0, member.id, true),
+                )?;
             }
             if member.optional {
                 let code = dds_dynamic_member_set_optional(&mut held.0, member.id, true);
