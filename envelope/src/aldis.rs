@@ -19,6 +19,10 @@ pub const PONG: &str = "aldis.Pong";
 pub const NODE_QUERY: &str = "aldis.NodeQuery";
 /// The answer to a [`NODE_QUERY`].
 pub const NODE_STATUS: &str = "aldis.NodeStatus";
+/// Asks the bridge to a DDS domain what it bridges.
+pub const DOMAIN_QUERY: &str = "aldis.DomainQuery";
+/// Its answer.
+pub const DOMAIN_STATUS: &str = "aldis.DomainStatus";
 /// Asks service 2 for the latest HealthReport of every resource that it has heard of; no content.
 pub const HEALTH_QUERY: &str = "aldis.HealthQuery";
 /// Asks service 3 for its log; the content is a [`LogQuery`], or nothing for all of it.

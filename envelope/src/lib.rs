@@ -27,7 +27,7 @@ pub use guid::{Guid, GuidForm, Guids};
 pub use id::{BootId, EntityId, ServiceId, Source};
 pub use key::{Fleet, Keys, Space};
 pub use message::{Attributes, Envelope, Label, Message};
-pub use name::{ContentType, Descriptor, Group, Name};
+pub use name::{ContentType, Descriptor, Group, Name, NameError};
 pub use prefix::Prefix;
 pub use stamp::{Priority, Stamp};
 pub use time::{DateTime, Monotonic, Now, Wall};

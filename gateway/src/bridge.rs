@@ -1,6 +1,8 @@
 //! Bridges: shells that move bytes between peers and the node.
 
 mod connection;
+#[cfg(feature = "dds")]
+pub(crate) mod dds;
 pub(crate) mod outgoing;
 mod peers;
 mod stream;
@@ -18,7 +20,7 @@ use tokio::sync::watch;
 
 /// What a bridge opens.
 #[derive(Debug, Clone)]
-#[allow(clippy::enum_variant_names, reason = "other worlds than UxAS will come")]
+#[allow(clippy::enum_variant_names, reason = "what peers speak to is UxAS")]
 pub(crate) enum Endpoint {
     /// The stream form over TCP.
     UxasTcp(uxas_tcp::Endpoint),

@@ -9,6 +9,8 @@ mod command;
 mod conform;
 mod content;
 mod demo;
+#[cfg(feature = "dds")]
+mod domain;
 mod exit;
 mod fleet;
 mod health;
@@ -107,6 +109,10 @@ enum Command {
     Plan(plan::Plan),
     /// Links of nodes, and bad links to try them on.
     Link(link::LinkArgs),
+    /// DDS domains, and the routes of bridges to them.
+    #[cfg(feature = "dds")]
+    #[command(name = "dds")]
+    Domain(domain::DdsArgs),
     /// Commands that wait to cross a link.
     Queue(queue::QueueArgs),
     /// Simulate in virtual time.
@@ -147,6 +153,8 @@ pub(crate) fn main() -> ExitCode {
         Command::Route(args) => args.run(),
         Command::Plan(args) => args.run(),
         Command::Link(args) => args.run(),
+        #[cfg(feature = "dds")]
+        Command::Domain(args) => args.run(),
         Command::Queue(args) => args.run(),
         Command::Sim(args) => args.run(),
         Command::Simulate(args) => args.run(),

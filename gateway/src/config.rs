@@ -28,7 +28,9 @@ pub(crate) mod uxas_file;
 
 pub(crate) use acl::acl;
 pub(crate) use allow::Allow;
-pub(crate) use bridge::{Bridge, Check, Endpoint, Framing, Sockets};
+#[cfg(feature = "dds")]
+pub(crate) use bridge::{BENCH_TYPE, bench_types, dds_types};
+pub(crate) use bridge::{Bridge, Check, Dds, Endpoint, Framing, Sockets};
 pub(crate) use bus::Bus;
 pub(crate) use entities::{Entities, Operators};
 pub(crate) use error::ConfigError;

@@ -61,6 +61,8 @@ pub(crate) fn run(
         link.link.keys.clone_from(keys);
     }
     let links = config.links.len();
+    #[cfg(feature = "dds")]
+    let services: Vec<_> = config.services.iter().map(|service| service.source).collect();
     let node = Node::new(config).map_err(RuntimeError::Config)?;
     let (journal, told) = match &outside.journal {
         Some((directory, config)) => open_journal(directory, config.clone()).map(Option::unzip)?,
@@ -73,7 +75,10 @@ pub(crate) fn run(
         if let Some(told) = told {
             tokio::task::spawn_local(journal_events(core.clone(), told));
         }
-        drive(core, ends, outside.for_links(links), keys, control).await;
+        let outside = outside.for_links(links);
+        #[cfg(feature = "dds")]
+        let outside = outside.for_services(&services);
+        drive(core, ends, outside, keys, control).await;
     });
     runtime.shutdown_timeout(Duration::from_secs(1));
     Ok(())
@@ -108,6 +113,11 @@ async fn drive(
     tasks.spawn_local(bus_task::drain(core.clone(), inbox.clone(), paused.clone()));
     for (i, endpoint) in outside.bridges.into_iter().enumerate() {
         tasks.spawn_local(bridge::serve(core.clone(), BridgeId(i), endpoint, paused.clone()));
+    }
+    #[cfg(feature = "dds")]
+    for domain in outside.domains {
+        let core = core.clone();
+        tasks.spawn_blocking(move || crate::bridge::dds::serve(&core, &domain));
     }
     for port in outside.udp {
         tasks.spawn_local(udp::serve(core.clone(), port));

@@ -14,8 +14,14 @@ pub struct AllowRule {
 }
 
 /// Requests that only read: everybody may send them.
-const READING: [&str; 5] =
-    [aldis::PING, aldis::NODE_QUERY, aldis::HEALTH_QUERY, aldis::LOG_QUERY, aldis::link::LINK_QUERY];
+const READING: [&str; 6] = [
+    aldis::PING,
+    aldis::NODE_QUERY,
+    aldis::HEALTH_QUERY,
+    aldis::LOG_QUERY,
+    aldis::DOMAIN_QUERY,
+    aldis::link::LINK_QUERY,
+];
 
 /// Requests that change how the node works begin so: only the own entities and the operators may send them.
 const ADMINISTRATION: [&str; 3] =

@@ -2,6 +2,7 @@
 
 use crate::journal::{Batch, JournalEvent};
 use crate::link::CarrierId;
+use crate::service::domain::{DomainCommand, DomainEvent};
 use crate::service::{ComponentHealth, Job, JobOutput, Note};
 use aldis_envelope::codec::native::HeaderError;
 use aldis_envelope::codec::stream::StreamError;
@@ -54,6 +55,8 @@ pub enum Event {
     Link(LinkId, LinkEvent),
     /// A job is done, or panicked with this text.
     Job(Source, u64, Result<JobOutput, String>),
+    /// Something in the DDS domain that a service bridges.
+    Domain(Source, DomainEvent),
     /// The health of something that the shell looks after changed.
     Component(ComponentHealth),
     /// The journal tells something. A node with a journal starts when all that stands in it has been told.
@@ -166,6 +169,8 @@ pub enum Effect {
     /// Append a batch to the journal, written before those after it. It has this number, one more than the last one's; what
     /// becomes of it is told with [`Event::Journal`]. No more is on its way at a time than a journal takes.
     Append(u64, Batch),
+    /// Do something in the DDS domain that a service bridges.
+    Domain(Source, DomainCommand),
     /// Tell people.
     Say(Note),
     /// Send [`Event::Deadline`] at this moment; replaces the last one.

@@ -28,6 +28,7 @@ pub(crate) struct Hosted {
     service: Option<Box<dyn Service>>,
     outbox: Outbox,
     prefixes: Vec<Prefix>,
+    congested: bool,
     deadline: Option<Monotonic>,
     started_at: Monotonic,
     restart_at: Option<Monotonic>,
@@ -45,6 +46,7 @@ impl Hosted {
             service: None,
             outbox,
             prefixes: Vec::new(),
+            congested: false,
             deadline: None,
             started_at: Monotonic::START,
             restart_at: None,
@@ -98,6 +100,21 @@ impl Hosted {
     /// Whether the service wants something done.
     pub(crate) fn has_actions(&self) -> bool {
         !self.outbox.is_empty()
+    }
+
+    /// The service receives these from now on.
+    pub(crate) fn set_prefixes(&mut self, prefixes: Vec<Prefix>) {
+        self.prefixes = prefixes;
+    }
+
+    /// The service hands on what is not taken, or it is taken again.
+    pub(crate) fn set_congested(&mut self, congested: bool) {
+        self.congested = congested;
+    }
+
+    /// Whether the service hands on what is not taken.
+    pub(crate) fn is_congested(&self) -> bool {
+        self.congested && self.is_running()
     }
 
     /// Ends the service for good.

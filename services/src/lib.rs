@@ -10,6 +10,7 @@ pub mod conform;
 pub mod counters;
 pub mod dds;
 pub mod destinations;
+pub mod domain;
 pub mod entities;
 pub mod event;
 pub mod health;

@@ -263,6 +263,7 @@ impl Node {
             Event::Bridge(bridge, event) => self.bridge(now, bridge, event, effects),
             Event::Link(id, event) => self.link_event(now, id, event, effects),
             Event::Job(source, number, result) => self.job_done(now, source, number, result, effects),
+            Event::Domain(source, event) => self.domain_event(now, source, event, effects),
             Event::Component(health) => self.component(now, &health),
             Event::Journal(event) => self.journal(now, event, effects),
             Event::Shutdown => self.shutdown(now, effects),
@@ -344,7 +345,9 @@ impl Node {
 
     /// Stops reading while a peer that is not given up has too much waiting.
     fn update_pause(&mut self, effects: &mut Vec<Effect>) {
-        let congested = self.bridges.iter().any(Bridge::is_congested) || self.journaling.is_opening();
+        let held_up = self.services.iter().any(Hosted::is_congested);
+        let congested =
+            held_up || self.bridges.iter().any(Bridge::is_congested) || self.journaling.is_opening();
         if congested != self.input_is_paused {
             self.input_is_paused = congested;
             effects.push(Effect::PauseInput(congested));

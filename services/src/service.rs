@@ -1,5 +1,6 @@
 //! What a service is: subscriptions, inputs, an outbox and a next deadline. A service knows nothing else of the world.
 
+pub mod domain;
 mod outbox;
 
 pub(crate) use outbox::refusal;
@@ -62,6 +63,8 @@ pub enum Input<'a> {
     Token(Source, bool),
     /// A job of its own is done, or panicked with this text.
     Job(u64, Result<JobOutput, String>),
+    /// Something in the DDS domain that this service bridges.
+    Domain(domain::DomainEvent),
     /// The health of a part of the node changed. Only the health service gets it.
     Component(&'a ComponentHealth),
     /// The node itself has something to say. Only the log service gets it.

@@ -27,6 +27,9 @@ pub fn program() -> &'static PathBuf {
         // With `--workspace` and `--examples` the dependencies have the features of `cargo test --workspace`: else all
         // of them would be built a second time.
         cargo.args(["build", "--quiet", "--offline", "--workspace", "--bin", "aldis", "--examples"]);
+        if cfg!(feature = "dds") {
+            cargo.args(["--features", "aldis/dds,aldis-tests/dds"]);
+        }
         cargo.args(["--profile", profile, "--target-dir"]).arg(target).current_dir(root());
         // Cargo tells a test about its package. Build scripts that look at that (ring's does) would run again, and what
         // hangs on them, here and in the next `cargo test`.

@@ -4,6 +4,8 @@ mod bus;
 mod child;
 mod configured;
 mod contention;
+#[cfg(feature = "dds")]
+mod dds;
 mod join;
 mod journal;
 mod link;
@@ -39,6 +41,13 @@ enum What {
     Uxas(uxas::UxasBench),
     /// From a ZeroMQ socket through a node to a ZeroMQ socket, against a bare forwarder.
     Zmq(zmq::ZmqBench),
+    /// From a DDS domain through two gateways to another, against DDS alone.
+    #[cfg(feature = "dds")]
+    Dds(dds::DdsBench),
+    /// The answering peer of `bench dds`.
+    #[cfg(feature = "dds")]
+    #[command(hide = true)]
+    DdsPeer(dds::DdsPeer),
     /// A late joiner of many retained instances, while their writer keeps writing.
     Join(join::JoinBench),
     /// LMCP messages read and written on one core.
@@ -88,6 +97,10 @@ impl Bench {
             What::Uxas(bench) => bench.run(),
             What::Zmq(bench) => bench.run(),
             What::ZmqCopy(copy) => copy.run(),
+            #[cfg(feature = "dds")]
+            What::Dds(bench) => bench.run(),
+            #[cfg(feature = "dds")]
+            What::DdsPeer(peer) => peer.run(),
             What::Join(bench) => bench.run(),
             What::Joiner(joiner) => joiner.run(),
             What::Lmcp(bench) => bench.run(),

@@ -14,6 +14,8 @@ use aldis_envelope::{Address, EntityId, ServiceId, Source};
 use clap::Subcommand;
 
 pub(super) use ask::ask;
+#[cfg(feature = "dds")]
+pub(super) use ask::ask_service;
 pub(super) use emulate::profile;
 pub(super) use plan::starving;
 

@@ -1,11 +1,16 @@
 //! Bridges: where another world is joined to the fleet.
 
 mod common;
+mod dds;
 mod uxas_serial;
 mod uxas_tcp;
 mod uxas_zmq;
 
 pub(crate) use common::Common;
+pub(crate) use dds::Dds;
+pub(super) use dds::DdsTable;
+#[cfg(feature = "dds")]
+pub(crate) use dds::{BENCH_TYPE, bench_types, dds_types};
 pub(super) use uxas_serial::UxasSerialTable;
 pub(crate) use uxas_serial::{Check, UxasSerial};
 pub(super) use uxas_tcp::UxasTcpTable;
@@ -26,7 +31,6 @@ pub(crate) const BRIDGE_SERVICES: RangeInclusive<u32> = 20..=99;
 /// One `[[bridge]]`, by its `kind`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
-#[allow(clippy::enum_variant_names, reason = "other worlds than UxAS will come")]
 pub(crate) enum Bridge {
     /// The UxAS stream form over TCP.
     UxasTcp(UxasTcp),
@@ -34,11 +38,13 @@ pub(crate) enum Bridge {
     UxasSerial(UxasSerial),
     /// UxAS over ZeroMQ.
     UxasZmq(UxasZmq),
+    /// A DDS domain.
+    Dds(Dds),
 }
 
 impl Bridge {
     /// What may stand as `kind`.
-    pub(crate) const KINDS: &[&str] = &["uxas-tcp", "uxas-serial", "uxas-zmq"];
+    pub(crate) const KINDS: &[&str] = &["uxas-tcp", "uxas-serial", "uxas-zmq", "dds"];
 
     /// What every kind has.
     pub(crate) fn common(&self) -> &Common {
@@ -46,6 +52,7 @@ impl Bridge {
             Self::UxasTcp(bridge) => &bridge.common,
             Self::UxasSerial(bridge) => &bridge.common,
             Self::UxasZmq(bridge) => &bridge.common,
+            Self::Dds(bridge) => &bridge.common,
         }
     }
 
@@ -56,7 +63,7 @@ impl Bridge {
             Self::UxasZmq(UxasZmq { sockets: Sockets::PublishPull { publish, pull }, .. }) => {
                 vec![("publish", *publish), ("pull", *pull)]
             }
-            Self::UxasTcp(_) | Self::UxasSerial(_) | Self::UxasZmq(_) => Vec::new(),
+            Self::UxasTcp(_) | Self::UxasSerial(_) | Self::UxasZmq(_) | Self::Dds(_) => Vec::new(),
         }
     }
 }

@@ -3,7 +3,9 @@
 //! Tables with a `kind` are taken out and read one by one, because serde loses the place of a mistake inside of them.
 
 use super::Config;
-use super::bridge::{Bridge, UxasSerial, UxasSerialTable, UxasTcp, UxasTcpTable, UxasZmq, UxasZmqTable};
+use super::bridge::{
+    Bridge, Dds, DdsTable, UxasSerial, UxasSerialTable, UxasTcp, UxasTcpTable, UxasZmq, UxasZmqTable,
+};
 use super::check;
 use super::cure::{nearest, split};
 use super::error::{ConfigError, Fault};
@@ -52,6 +54,13 @@ pub(super) fn read_files(
             }
             Service::Recorder(recorder) => recorder.stand(base),
             _ => {}
+        }
+    }
+    for (index, bridge) in config.bridges.iter_mut().enumerate() {
+        if let Bridge::Dds(dds) = bridge
+            && let Err(fault) = dds.read_types(base)
+        {
+            mistakes.push(located(&source, text, Mistake::Fault(fault.below(&format!("bridge.{index}")))));
         }
     }
     ConfigError::all(mistakes).map_or(Ok(()), Err)
@@ -108,6 +117,10 @@ fn bridge(element: Element<'_>, index: usize) -> Result<Bridge, Mistake> {
         "uxas-zmq" => {
             let bridge = UxasZmq::try_from(typed::<UxasZmqTable>(table)?);
             Ok(Bridge::UxasZmq(bridge.map_err(|f| Mistake::Fault(f.below(&path)))?))
+        }
+        "dds" => {
+            let bridge = Dds::try_from(typed::<DdsTable>(table)?);
+            Ok(Bridge::Dds(bridge.map_err(|f| Mistake::Fault(f.below(&path)))?))
         }
         other => Err(unknown_kind(&path, other, Bridge::KINDS)),
     }

@@ -23,6 +23,9 @@ pub(crate) struct Shared {
     core: Arc<Mutex<Core>>,
     /// How many wait for the lock. Callbacks, which come in quick succession, stand back for them.
     waiting: Arc<AtomicUsize>,
+    /// Wakes the loop.
+    #[cfg_attr(not(feature = "dds"), allow(dead_code, reason = "only domains have events beside the bus"))]
+    wake: Arc<Notify>,
 }
 
 impl Shared {
@@ -32,6 +35,22 @@ impl Shared {
         let core = self.core.lock().unwrap_or_else(PoisonError::into_inner);
         self.waiting.fetch_sub(1, Ordering::Relaxed);
         core
+    }
+
+    /// Hands in an event of a domain on the thread that has it, where the node is idle; otherwise it waits in order. `false` where too
+    /// many wait.
+    #[cfg(feature = "dds")]
+    pub(crate) fn domain_event(&self, inbox: &crate::bridge::dds::Inbox, event: Event, must: bool) -> bool {
+        let event = match self.try_lock().filter(|_| inbox.is_empty()) {
+            Some(mut core) => match core.handle_on_callback(event) {
+                None => return true,
+                Some(event) => event,
+            },
+            None => event,
+        };
+        let taken = inbox.push(event, must);
+        self.wake.notify_one();
+        taken
     }
 
     /// Locks the node where nobody else has it or waits for it.
@@ -82,6 +101,8 @@ pub(crate) struct Core {
     bus: Option<Bus>,
     peers: Peers,
     carriers: Carriers,
+    #[cfg(feature = "dds")]
+    domains: crate::bridge::dds::Domains,
     runtime: tokio::runtime::Handle,
     timer: watch::Sender<Option<Monotonic>>,
     paused: watch::Sender<bool>,
@@ -116,14 +137,17 @@ impl Core {
             bus: None,
             peers,
             carriers: Carriers::default(),
+            #[cfg(feature = "dds")]
+            domains: crate::bridge::dds::Domains::default(),
             runtime,
             timer,
             paused,
             exited,
             jobs,
         };
+        let wakes = wake.clone();
         let ends = Ends { timer: timer_end, paused: paused_end, exited: exited_end, jobs: jobs_end, wake };
-        (Shared { core: Arc::new(Mutex::new(core)), waiting: Arc::default() }, ends)
+        (Shared { core: Arc::new(Mutex::new(core)), waiting: Arc::default(), wake: wakes }, ends)
     }
 
     pub(crate) fn clock(&self) -> Clock {
@@ -136,6 +160,11 @@ impl Core {
 
     pub(crate) fn carriers(&mut self) -> &mut Carriers {
         &mut self.carriers
+    }
+
+    #[cfg(feature = "dds")]
+    pub(crate) fn domains(&mut self) -> &mut crate::bridge::dds::Domains {
+        &mut self.domains
     }
 
     /// Takes a session, or gives it up; the node is to be told by an event.
@@ -161,6 +190,8 @@ impl Core {
         while let Some(effect) = self.deferred.pop_front() {
             self.carry_out_on_bus(effect, events);
         }
+        #[cfg(feature = "dds")]
+        self.domains.take_arrivals(events);
         self.work(events, On::Loop);
     }
 
@@ -186,16 +217,27 @@ impl Core {
                 self.carry_out(now.monotonic, effect, on, events);
             }
             self.effects = effects;
-            if on == On::Callback && self.peers.has_output() && !self.is_quiet(now.monotonic) {
+            if on == On::Callback && self.has_output() && !self.is_quiet(now.monotonic) {
                 self.wake.notify_one();
-            } else if self.peers.has_output() {
+            } else if self.has_output() {
                 self.last_out = Some(now.monotonic);
                 self.peers.flush(events);
+                #[cfg(feature = "dds")]
+                self.domains.flush();
             }
             if events.is_empty() {
                 return;
             }
         }
+    }
+
+    /// Whether anything is prepared that is not written yet.
+    fn has_output(&self) -> bool {
+        #[cfg(feature = "dds")]
+        if self.domains.has_output() {
+            return true;
+        }
+        self.peers.has_output()
     }
 
     fn carry_out(&mut self, now: Monotonic, effect: Effect, on: On, events: &mut Vec<Event>) {
@@ -215,6 +257,10 @@ impl Core {
                 }
             }
             Effect::Say(note) => say(&note),
+            #[cfg(feature = "dds")]
+            Effect::Domain(source, command) => self.domains.carry_out(source, command, events),
+            #[cfg(not(feature = "dds"))]
+            Effect::Domain(..) => {}
             Effect::Job(source, number, job) => self.start_job(source, number, job),
             Effect::Exit => {
                 self.exited.send_replace(true);

@@ -1,5 +1,7 @@
 //! From a configuration to a node and to what the shell has to open for it.
 
+mod domain;
+
 use super::bus_task::Joining;
 use crate::bridge::{Endpoint, Limits, Side, uxas_serial, uxas_tcp, uxas_zmq};
 use crate::bus::Congestion;
@@ -23,6 +25,8 @@ use std::path::PathBuf;
 pub(crate) struct Outside {
     pub(super) bus: Joining,
     pub(super) bridges: Vec<Endpoint>,
+    #[cfg(feature = "dds")]
+    pub(super) domains: Vec<crate::bridge::dds::Endpoint>,
     /// The keys of each link.
     pub(super) link_keys: Vec<Vec<LinkKey>>,
     pub(super) udp: Vec<udp::Port>,
@@ -44,6 +48,15 @@ impl Outside {
     }
 }
 
+#[cfg(feature = "dds")]
+impl Outside {
+    /// Without the domains of services that the node does not have.
+    pub(super) fn for_services(mut self, services: &[Source]) -> Self {
+        self.domains.retain(|domain| services.contains(&domain.source));
+        self
+    }
+}
+
 /// Why the outside of a configuration cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum OutsideError {
@@ -53,6 +66,10 @@ pub(crate) enum OutsideError {
     /// A key of a link.
     #[error(transparent)]
     Key(#[from] config::KeyError),
+    /// A configuration of Cyclone DDS.
+    #[cfg(feature = "dds")]
+    #[error("{}: {1}", .0.display())]
+    CycloneDds(PathBuf, std::io::Error),
 }
 
 /// What the shell opens for a configuration.
@@ -73,7 +90,9 @@ pub(crate) fn outside(config: &Config) -> Result<Outside, OutsideError> {
     let journal = config.journal.as_ref().map(kept);
     Ok(Outside {
         bus,
-        bridges: config.bridges.iter().map(endpoint).collect(),
+        bridges: config.bridges.iter().filter_map(endpoint).collect(),
+        #[cfg(feature = "dds")]
+        domains: domain::endpoints(config)?,
         link_keys,
         udp,
         lines,
@@ -123,10 +142,11 @@ fn carriers(config: &Config) -> (Vec<udp::Port>, Vec<serial::Line>) {
     (ports, lines)
 }
 
-fn endpoint(bridge: &config::Bridge) -> Endpoint {
+/// What is opened for a bridge; none where it is a domain, which has a service of its own.
+fn endpoint(bridge: &config::Bridge) -> Option<Endpoint> {
     let common = bridge.common();
     let (dialect, message_bytes_max) = (common.dialect, common.message_bytes_max as usize);
-    match bridge {
+    Some(match bridge {
         config::Bridge::UxasTcp(bridge) => Endpoint::UxasTcp(uxas_tcp::Endpoint {
             side: match bridge.endpoint {
                 config::Endpoint::Listen(address) => Side::Listen(address),
@@ -160,7 +180,8 @@ fn endpoint(bridge: &config::Bridge) -> Endpoint {
             dialect,
             message_bytes_max,
         }),
-    }
+        config::Bridge::Dds(_) => return None,
+    })
 }
 
 /// What is subscribed to for a prefix: at least what it matches, in either dialect.
@@ -177,6 +198,7 @@ pub(crate) fn node_config(config: &Config) -> NodeConfig {
     let guids = Guids::new(&config.fleet, config.guid);
     let mut services = registry::built_in(own, &guids, config.health.report_period());
     services.extend(config.arbitration().map(|arbitration| registry::arbiter(own, &guids, arbitration)));
+    services.extend(domain::services(config));
     services.extend(config.services.iter().map(|service| configured(&config.fleet, own, service, &guids)));
     NodeConfig {
         fleet: config.fleet.clone(),
@@ -189,7 +211,7 @@ pub(crate) fn node_config(config: &Config) -> NodeConfig {
         topics: config.topics.iter().map(config::Topic::rule).collect(),
         reliable: true,
         services,
-        bridges: config.bridges.iter().map(|bridge| bridge_spec(own, bridge)).collect(),
+        bridges: config.bridges.iter().filter_map(|bridge| bridge_spec(own, bridge)).collect(),
         links: config.links.iter().map(|link| link.spec(own)).collect(),
     }
 }
@@ -240,7 +262,10 @@ fn configured(fleet: &Fleet, own: EntityId, service: &config::Service, guids: &G
     }
 }
 
-fn bridge_spec(own: EntityId, bridge: &config::Bridge) -> BridgeSpec {
+fn bridge_spec(own: EntityId, bridge: &config::Bridge) -> Option<BridgeSpec> {
+    if matches!(bridge, config::Bridge::Dds(_)) {
+        return None;
+    }
     let common = bridge.common();
     let name = common.name.as_str().to_owned();
     // Whom a bridge subscribes to and whom it pushes to are one.
@@ -249,7 +274,7 @@ fn bridge_spec(own: EntityId, bridge: &config::Bridge) -> BridgeSpec {
         config::Bridge::UxasZmq(zmq) if matches!(zmq.sockets, config::Sockets::SubscribePush { .. })
     );
     let peer = common.peer.as_ref().map(|peer| peer.as_str().to_owned());
-    BridgeSpec {
+    Some(BridgeSpec {
         source: Source::new(own, common.service),
         dialect: common.dialect,
         import: common.import.clone(),
@@ -260,5 +285,5 @@ fn bridge_spec(own: EntityId, bridge: &config::Bridge) -> BridgeSpec {
         peer: peer.or_else(|| connects.then(|| format!("bridge {name}"))),
         self_generated: common.self_generated,
         name,
-    }
+    })
 }

@@ -78,6 +78,14 @@ impl Topics {
 
 /// What the pattern of a name asks for.
 fn by_pattern(name: &str) -> Option<Qos> {
+    if name.starts_with("dds::") {
+        // Any other topic of a DDS domain: its own promises are kept there, on the way the newest of each instance is.
+        return Some(Qos {
+            durability: Durability::TransientLocal,
+            keep: Keep::Last(1),
+            samples_max: SAMPLES_MAX,
+        });
+    }
     let (durability, keep) = match Pattern::of(name)? {
         Pattern::Log => (Durability::Volatile, Keep::All),
         // No transition may be skipped.

@@ -1,15 +1,21 @@
 //! The life of services inside a node: starts, crashes, deadlines, notes, the end.
 
-use super::{Node, Origin, WORK_MAX, Work};
+use super::{Node, Origin, Passed, WORK_MAX, Work};
 use crate::event::Effect;
 use crate::host::Ran;
+use crate::service::domain::DomainEvent;
 use crate::service::{Action, Component, ComponentHealth, Condition, Input, JobOutput, Level, Note};
-use aldis_envelope::{Address, CallId, Message, Now, Refusal, ServiceId, Source};
+use aldis_envelope::{Address, CallId, Message, Now, Prefix, Priority, Refusal, ServiceId, Source, Wall};
 use std::time::Duration;
 
 /// What a service says.
 fn work(place: usize, message: Message) -> Work {
     Work::new(Origin::Service(place), message)
+}
+
+/// What the stamp says of a message that was said elsewhere.
+fn said_at(source_time: Wall) -> Passed {
+    Passed { source_time, lifespan_left_ms: None, priority: Priority::Data, via: Vec::new() }
 }
 
 impl Node {
@@ -82,6 +88,13 @@ impl Node {
                     let work = Work { confirm, ..work(place, message) };
                     self.take_message(now, source, work, effects);
                 }
+                Action::SendAt(message, source_time) => {
+                    let work = Work { passed: Some(Box::new(said_at(source_time))), ..work(place, message) };
+                    self.take_message(now, source, work, effects);
+                }
+                Action::Subscribe(prefixes) => self.subscribe_anew(now, place, prefixes, effects),
+                Action::Domain(command) => effects.push(Effect::Domain(source, command)),
+                Action::Congested(congested) => self.services[place].set_congested(congested),
                 Action::Call(message, within) => self.open_call(now, place, message, within, effects),
                 Action::Job(number, job) => effects.push(Effect::Job(source, number, job)),
                 Action::Note(note) => self.note(now, note, effects),
@@ -99,6 +112,45 @@ impl Node {
             }
         }
         self.actions = actions;
+    }
+
+    /// Something in a DDS domain, for the service that bridges it.
+    pub(super) fn domain_event(
+        &mut self,
+        now: Now,
+        source: Source,
+        event: DomainEvent,
+        effects: &mut Vec<Effect>,
+    ) {
+        if let Some(place) = self.services.iter().position(|hosted| hosted.spec.source == source) {
+            self.run(now, place, Input::Domain(event), effects);
+        }
+    }
+
+    /// A service receives something else from now on. What is kept here of what is new to it comes at once, what others retain as
+    /// it is told.
+    fn subscribe_anew(&mut self, now: Now, place: usize, prefixes: Vec<Prefix>, effects: &mut Vec<Effect>) {
+        let had: Vec<Prefix> = self.services[place].subscribed().cloned().collect();
+        self.services[place].set_prefixes(prefixes);
+        let own = self.services[place].spec.source;
+        let is_new = |address: &Address| {
+            self.services[place].receives(address) && !had.iter().any(|prefix| prefix.matches(address))
+        };
+        let mut kept = Vec::new();
+        for (address, history) in self.sharing.writers.histories() {
+            if is_new(address) {
+                kept.extend(history.samples().filter(|s| s.message.label.source() != own).cloned());
+            }
+        }
+        for (address, history) in self.sharing.reading.histories() {
+            if is_new(&address) {
+                kept.extend(history.samples().cloned());
+            }
+        }
+        self.subscribe(now, effects);
+        for envelope in &kept {
+            self.run(now, place, Input::Message(envelope), effects);
+        }
     }
 
     fn take_message(&mut self, now: Now, source: Source, work: Work, effects: &mut Vec<Effect>) {

@@ -1,8 +1,10 @@
 //! What a service wants done, in the order in which it said so.
 
+use super::domain::DomainCommand;
 use super::{Job, Level, Note, ServiceSpec};
 use aldis_envelope::{
-    Address, Call, CallId, ContentType, Descriptor, Envelope, Label, Message, Name, Refusal, Role, Source,
+    Address, Call, CallId, ContentType, Descriptor, Envelope, Label, Message, Name, Prefix, Refusal, Role,
+    Source, Wall,
 };
 use bytes::Bytes;
 use std::sync::Arc;
@@ -14,6 +16,14 @@ pub enum Action {
     Send(Message),
     /// Send a message and say when every reader has it: with this number, at most so long.
     SendConfirmed(Message, u64, Duration),
+    /// Send a message that its source said at this moment.
+    SendAt(Message, Wall),
+    /// Receive these from now on, and no others.
+    Subscribe(Vec<Prefix>),
+    /// Do something in the DDS domain that this service bridges.
+    Domain(DomainCommand),
+    /// Stop (true) or go on reading from peers and bus: what this service hands on is not taken.
+    Congested(bool),
     /// Send a request and wait for its answers for so long.
     Call(Message, Duration),
     /// Compute something outside the loop; the number comes back with the result.
@@ -48,6 +58,26 @@ impl Outbox {
     /// Sends a message. Its source must be the service's own: others are refused and noted.
     pub fn send(&mut self, message: Message) {
         self.actions.push(Action::Send(message));
+    }
+
+    /// Sends a message that was said elsewhere at this moment.
+    pub fn send_at(&mut self, message: Message, source_time: Wall) {
+        self.actions.push(Action::SendAt(message, source_time));
+    }
+
+    /// Receives these from now on, in place of what it received before. What is retained of what is new comes as messages.
+    pub fn subscribe(&mut self, prefixes: Vec<Prefix>) {
+        self.actions.push(Action::Subscribe(prefixes));
+    }
+
+    /// Has something done in the DDS domain that this service bridges.
+    pub fn domain(&mut self, command: DomainCommand) {
+        self.actions.push(Action::Domain(command));
+    }
+
+    /// Says whether what it hands on is not taken, so that the node must stop reading.
+    pub fn congested(&mut self, congested: bool) {
+        self.actions.push(Action::Congested(congested));
     }
 
     /// Sends a message, and wants to be told with [`Input::Confirmed`](super::Input::Confirmed) and this number once every

@@ -321,7 +321,8 @@ impl World {
             Effect::Exit => machine.exited = true,
             Effect::Say(note) => self.observe(place, Seen::Said(&note)),
             Effect::Transmit(link, carrier, frame) => self.transmit(place, link, carrier, frame),
-            Effect::PauseInput(_) | Effect::Found(..) => {}
+            // The simulator joins no domain.
+            Effect::PauseInput(_) | Effect::Found(..) | Effect::Domain(..) => {}
         }
     }
 

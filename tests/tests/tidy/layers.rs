@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 const PACKAGES: [(&str, &[&str]); 3] = [
     ("envelope", &[]),
     ("services", &["aldis-envelope"]),
-    ("gateway", &["aldis-envelope", "aldis-services"]),
+    ("gateway", &["aldis-dds", "aldis-envelope", "aldis-services"]),
 ];
 
 /// The modules of `services`, low to high. A module imports from lower rows alone, never from its own row, so that no
@@ -19,7 +19,7 @@ const LAYERS: [&[&str]; 9] = [
     &["destinations", "link", "map", "plan", "umaa"],
     &["event"],
     &["bridge", "labels"],
-    &["conform", "entities", "health", "log", "manager", "player", "recorder", "track", "uxas"],
+    &["conform", "domain", "entities", "health", "log", "manager", "player", "recorder", "track", "uxas"],
     &["host", "registry"],
     &["node"],
     &["sim"],

@@ -54,9 +54,19 @@ pub(in crate::cli) fn ask<T: DeserializeOwned>(
     request: &str,
     content: Vec<u8>,
 ) -> Result<T, Failure> {
+    ask_service(join, Source::new(node, ServiceId::NODE), request, content)
+}
+
+/// Asks a service, and reads its answer.
+pub(in crate::cli) fn ask_service<T: DeserializeOwned>(
+    join: &Join,
+    service: Source,
+    request: &str,
+    content: Vec<u8>,
+) -> Result<T, Failure> {
     let (tell, told) = mpsc::channel();
     let asking = Asking {
-        to: Address::Service(Source::new(node, ServiceId::NODE)),
+        to: Address::Service(service),
         request: Descriptor::new(request).map_err(|why| Failure::Failed(why.to_string()))?,
         content: content.into(),
         asked: false,
@@ -68,6 +78,6 @@ pub(in crate::cli) fn ask<T: DeserializeOwned>(
     member.leave()?;
     let answer = answer?.map_err(Failure::Refused)?;
     aldis::decode(&answer).ok_or_else(|| {
-        Failure::Failed(format!("node {node} answers `{request}` in a way that this program does not read"))
+        Failure::Failed(format!("{service} answers `{request}` in a way that this program does not read"))
     })
 }

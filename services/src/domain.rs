@@ -1,0 +1,231 @@
+//! A DDS domain beside the fleet: what its writers say goes out on the bus, what the fleet says its readers get.
+//!
+//! The bridge is a service. So the node repairs, orders and retains for it as for any other (`dds`), and who comes late on one side
+//! gets what the other side has. **Routes** are its own readers and writers in the domain, opened by what discovery finds: a reader
+//! for a topic that somebody writes, a writer for one that somebody reads.
+
+mod config;
+mod forms;
+mod incoming;
+mod outgoing;
+mod presence;
+mod quality;
+mod report;
+mod routes;
+#[cfg(test)]
+mod tests;
+
+pub use config::{DomainConfig, Pattern, QualityRule};
+pub use presence::mark;
+pub use quality::text as quality_in_words;
+pub use report::{DomainStatus, RouteStatus};
+
+use crate::counters::counters;
+use crate::service::domain::{Arrival, DomainEvent, DomainGuid, Endpoint, RouteId};
+use crate::service::{Input, Level, Outbox, Service};
+use aldis_envelope::{Now, Prefix, Refusal, aldis};
+use forms::Forms;
+use incoming::Registered;
+use outgoing::Written;
+use presence::Presence;
+use routes::{Routes, Way};
+use std::collections::BTreeMap;
+
+/// How many changes wait for what discovery says of their writer, for each writer: news of it is on its way already.
+const EARLY_MAX: usize = 1_024;
+/// How many writers may have changes waiting so.
+const EARLY_WRITERS_MAX: usize = 256;
+
+counters! {
+    /// What the bridge to a domain counts.
+    DomainCounters {
+    /// Changes that went from the domain to the fleet.
+    imported,
+    /// Changes that went from the fleet to the domain.
+    exported,
+    /// Changes that were no sample of their type.
+    refused_malformed,
+    /// Disposes and unregisters that named an instance by its hash alone, of which nothing is known.
+    refused_unknown_key,
+    /// Changes for the domain that Cyclone DDS refused.
+    refused_write,
+    /// Changes for the domain that were dropped because its readers confirmed nothing for too long.
+    shed_stalled,
+    /// Changes from a writer that discovery never told of.
+    shed_unannounced,
+    /// Changes that another gateway had written.
+    echoes_stopped,
+    /// Instances that were left by the last who wrote them.
+    instances_left,
+    /// Endpoints that did not come together with a route.
+    mismatches,
+    }
+}
+
+/// The bridge of one domain and partition.
+pub struct Domain {
+    config: DomainConfig,
+    forms: Forms,
+    endpoints: BTreeMap<DomainGuid, Endpoint>,
+    presence: Presence,
+    routes: Routes,
+    /// By route: who has which instance registered.
+    registered: BTreeMap<RouteId, Registered>,
+    /// By route: what was written for whom.
+    written: BTreeMap<RouteId, Written>,
+    /// Changes of writers that discovery has not told of yet.
+    early: BTreeMap<DomainGuid, Vec<(RouteId, Arrival)>>,
+    counters: DomainCounters,
+    subscribed: Vec<Prefix>,
+    congested: bool,
+}
+
+impl Domain {
+    /// The bridge, before anything is known of its domain.
+    pub fn new(config: DomainConfig) -> Self {
+        Self {
+            forms: Forms::new(config.types.clone(), config.exact.clone()),
+            presence: Presence::new(&config),
+            config,
+            endpoints: BTreeMap::new(),
+            routes: Routes::default(),
+            registered: BTreeMap::new(),
+            written: BTreeMap::new(),
+            early: BTreeMap::new(),
+            counters: DomainCounters::default(),
+            subscribed: Vec::new(),
+            congested: false,
+        }
+    }
+
+    fn domain(&mut self, event: DomainEvent, out: &mut Outbox) {
+        match event {
+            DomainEvent::Joined => {}
+            DomainEvent::Endpoint(endpoint) => self.endpoint(*endpoint, out),
+            DomainEvent::EndpointGone(guid) => {
+                self.early.remove(&guid);
+                if self.endpoints.remove(&guid).is_some() {
+                    self.route_anew(out);
+                }
+            }
+            DomainEvent::Participant(guid, data) => {
+                if self.presence.came(guid, &data) {
+                    self.route_anew(out);
+                }
+            }
+            DomainEvent::ParticipantGone(guid) => {
+                if self.presence.went(guid) {
+                    self.route_anew(out);
+                }
+            }
+            DomainEvent::Opened(route, result) => {
+                if let Some(trouble) = self.routes.opened(route, result) {
+                    out.note(Level::Warning, trouble);
+                }
+            }
+            DomainEvent::Arrived(route, arrival) => self.arrived(route, arrival, out),
+            DomainEvent::WriterGone(route, writer, autodispose) => {
+                self.early.remove(&writer);
+                self.writer_gone(route, writer, autodispose, out);
+            }
+            DomainEvent::Mismatch(route, policy) => self.mismatch(route, &policy, out),
+            DomainEvent::Refused(route, why) => {
+                self.counters.refused_write += 1;
+                if let Some(text) = self.routes.first_trouble(route, &why) {
+                    out.note(Level::Warning, text);
+                }
+            }
+            DomainEvent::Waiting(count) => {
+                let congested = count > self.config.queue_max / 2;
+                if congested != self.congested {
+                    self.congested = congested;
+                    out.congested(congested);
+                }
+            }
+            DomainEvent::Shed(route, count) => {
+                self.counters.shed_stalled += count;
+                if let Some(route) = self.routes.get(route) {
+                    let topic = &route.topic;
+                    out.note(
+                        Level::Warning,
+                        format!("{count} changes of {topic} dropped: its readers confirm nothing"),
+                    );
+                }
+            }
+        }
+    }
+
+    fn endpoint(&mut self, endpoint: Endpoint, out: &mut Outbox) {
+        let guid = endpoint.guid;
+        self.endpoints.insert(guid, endpoint);
+        self.route_anew(out);
+        for (route, arrival) in self.early.remove(&guid).unwrap_or_default() {
+            self.arrived(route, arrival, out);
+        }
+    }
+
+    /// Opens and closes routes for those that are there.
+    fn route_anew(&mut self, out: &mut Outbox) {
+        let wanted = self.wanted();
+        let (opened, closed) = self.routes.change(wanted);
+        for route in closed {
+            self.close(route, out);
+        }
+        for opening in opened {
+            out.domain(crate::service::domain::DomainCommand::Open(Box::new(opening)));
+        }
+        let mut prefixes: Vec<Prefix> = self
+            .routes
+            .all()
+            .filter(|route| route.way == Way::Out)
+            .filter_map(|route| Prefix::new(&forms::address_of(&route.topic)).ok())
+            .collect();
+        prefixes.sort();
+        prefixes.dedup();
+        if prefixes != self.subscribed {
+            self.subscribed.clone_from(&prefixes);
+            out.subscribe(prefixes);
+        }
+    }
+
+    fn mismatch(&mut self, route: RouteId, policy: &str, out: &mut Outbox) {
+        self.counters.mismatches += 1;
+        let Some(found) = self.routes.get(route) else { return };
+        let other =
+            |endpoint: &&Endpoint| endpoint.topic == found.topic && endpoint.writes == (found.way == Way::In);
+        let theirs = self.endpoints.values().filter(other).map(|endpoint| quality::text(&endpoint.quality));
+        let theirs = theirs.collect::<Vec<_>>().join("; ");
+        let text = format!(
+            "{}: {policy} does not agree: the bridge {} {}, the other side {theirs}",
+            found.topic,
+            if found.way == Way::In { "requests" } else { "offers" },
+            quality::text(&found.quality),
+        );
+        if let Some(text) = self.routes.first_trouble(route, &text) {
+            out.note(Level::Warning, text);
+        }
+    }
+}
+
+impl Service for Domain {
+    fn follows_bus(&self) -> bool {
+        true
+    }
+
+    fn handle(&mut self, _: Now, input: Input<'_>, out: &mut Outbox) {
+        match input {
+            Input::Domain(event) => self.domain(event, out),
+            Input::Message(envelope) if envelope.message.call.is_some() => {
+                if envelope.message.label.descriptor() == aldis::DOMAIN_QUERY {
+                    self.report(envelope, out);
+                } else {
+                    let what = envelope.message.label.descriptor().to_owned();
+                    out.refuse(envelope, Refusal::NotUnderstood(what));
+                }
+            }
+            Input::Message(envelope) => self.leaves(envelope, out),
+            Input::Token(source, false) => self.source_gone(source, out),
+            _ => {}
+        }
+    }
+}
