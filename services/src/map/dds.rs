@@ -7,6 +7,7 @@ mod rules;
 #[cfg(test)]
 mod tests;
 mod topic;
+mod version;
 
 pub use newer::{NewerBus, NewerError};
 pub use order::in_order;

@@ -19,12 +19,7 @@ struct Conversion<'a> {
 
 impl Translator {
     /// A sample of a type in the other version, where the type has the same name.
-    pub(super) fn converted(
-        &mut self,
-        sample: &Sample,
-        type_name: &str,
-        newer: bool,
-    ) -> Result<Value, Lost> {
+    pub(super) fn converted(&mut self, sample: &Sample, type_name: &str, newer: bool) -> Result<Value, Lost> {
         self.converted_value(&sample.topic, type_name, &sample.value, sample.change != Change::Put, newer)
     }
 
@@ -49,7 +44,9 @@ impl Conversion<'_> {
     fn value(&mut self, from: &Type, to: &Type, value: &Value, member: &str) -> Result<Value, Lost> {
         let (source, wanted) = (self.from.resolved(from), self.to.resolved(to));
         match (source, wanted, value) {
-            (Resolved::Plain(_), Resolved::Defined(IDENTIFIER, _), Value::Octets(id)) => Ok(self.identifier(id)),
+            (Resolved::Plain(_), Resolved::Defined(IDENTIFIER, _), Value::Octets(id)) => {
+                Ok(self.identifier(id))
+            }
             (Resolved::Defined(IDENTIFIER, _), Resolved::Plain(_), Value::Structure(members)) => {
                 self.guid(members, member)
             }
@@ -141,13 +138,7 @@ pub(super) fn member<'a>(
 }
 
 /// Sets a member of a structure's value by its name.
-pub(super) fn set(
-    library: &Library,
-    type_name: &str,
-    value: &mut Value,
-    name: &str,
-    held: Option<Value>,
-) {
+pub(super) fn set(library: &Library, type_name: &str, value: &mut Value, name: &str, held: Option<Value>) {
     if let (Some(place), Value::Structure(members)) = (place_of(library, type_name, name), value)
         && let Some(member) = members.get_mut(place)
     {

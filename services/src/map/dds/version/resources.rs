@@ -82,7 +82,8 @@ impl Translator {
         }
         for (id, held) in changed {
             said.update = (*id, Some(stamp.clone()));
-            let value = Value::Structure(vec![Some(held.clone()), octets(set), octets(*id), Some(stamp.clone())]);
+            let value =
+                Value::Structure(vec![Some(held.clone()), octets(set), octets(*id), Some(stamp.clone())]);
             samples.push(Sample { topic: RESOURCES_ELEMENT.to_owned(), change: Change::Put, value });
         }
         let size = Value::Signed(wanted.len() as i64);
@@ -171,7 +172,8 @@ impl Translator {
         }
         let stamp = member(&self.newer, REPORT, report, "timeStamp").cloned();
         let source = guid_of(member(&self.newer, REPORT, report, "source"));
-        let (held, made) = (elements.values().map(|(held, _)| held.clone()).collect::<Vec<_>>(), made.clone());
+        let (held, made) =
+            (elements.values().map(|(held, _)| held.clone()).collect::<Vec<_>>(), made.clone());
         if held.len() > 256 {
             let (topic, member) = (CONFIG.to_owned(), "resources".to_owned());
             return Err(Lost::TooLong { topic, member, length: held.len(), bound: 256 });

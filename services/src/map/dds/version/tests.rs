@@ -80,7 +80,10 @@ fn every_plain_topic_comes_back_from_the_other_version() {
         for sample in [sample.clone(), ends(translator.older(), type_name, &sample, Change::Dispose)] {
             let newer = translator.to_newer(&sample);
             assert_eq!((newer.samples.len(), newer.lost.len()), (1, 0), "{topic}");
-            assert_eq!((newer.samples[0].topic.as_str(), newer.samples[0].change), (type_name, sample.change));
+            assert_eq!(
+                (newer.samples[0].topic.as_str(), newer.samples[0].change),
+                (type_name, sample.change)
+            );
             let source = &shown(translator.newer(), type_name, &newer.samples[0])["source"];
             assert!(source["id"].is_string() && source["parentID"] == guid(0), "{source}");
             let again = translator.to_older(&newer.samples[0]);
@@ -118,7 +121,8 @@ fn health(code: &str, time: i64) -> serde_json::Value {
 fn health_has_one_instance_a_code_in_the_one_and_one_altogether_in_the_other() {
     let mut translator = Translator::new().unwrap();
     let type_name = umaa::topic(HEALTH).unwrap().type_name;
-    let (ram, rom) = (older(&translator, HEALTH, health("RAM", 1)), older(&translator, HEALTH, health("ROM", 2)));
+    let (ram, rom) =
+        (older(&translator, HEALTH, health("RAM", 1)), older(&translator, HEALTH, health("ROM", 2)));
     let told = |translator: &mut Translator, sample: &Sample| {
         let outcome = translator.to_newer(sample);
         let tell = |sample: &Sample| {
@@ -156,9 +160,7 @@ fn health_has_one_instance_a_code_in_the_one_and_one_altogether_in_the_other() {
 }
 
 fn config(resources: &[(u128, u128)], time: i64) -> serde_json::Value {
-    let definition = |(resource, related): &(u128, u128)| {
-        json!({ "relatedSources": [guid(*related)], "resourceID": guid(*resource) })
-    };
+    let definition = |(resource, related): &(u128, u128)| json!({ "relatedSources": [guid(*related)], "resourceID": guid(*resource) });
     let resources: Vec<_> = resources.iter().map(definition).collect();
     json!({ "resources": resources, "timeStamp": stamp(time), "source": guid(1) })
 }
@@ -167,7 +169,8 @@ fn config(resources: &[(u128, u128)], time: i64) -> serde_json::Value {
 fn resources_become_a_large_set_and_come_back_when_it_is_stable() {
     let (mut there, mut back) = (Translator::new().unwrap(), Translator::new().unwrap());
     let topic = resources::CONFIG;
-    let versions: [&[(u128, u128)]; 6] = [&[], &[(5, 1)], &[(5, 1), (6, 2)], &[(5, 3), (7, 2)], &[(7, 2)], &[(7, 2)]];
+    let versions: [&[(u128, u128)]; 6] =
+        [&[], &[(5, 1)], &[(5, 1), (6, 2)], &[(5, 3), (7, 2)], &[(7, 2)], &[(7, 2)]];
     let mut operations = Vec::new();
     for (time, resources) in (1..).zip(versions) {
         let mut sample = older(&there, topic, config(resources, time));
