@@ -68,8 +68,13 @@ pub(crate) enum OutsideError {
     Key(#[from] config::KeyError),
     /// A configuration of Cyclone DDS.
     #[cfg(feature = "dds")]
-    #[error("{}: {1}", .0.display())]
-    CycloneDds(PathBuf, std::io::Error),
+    #[error("{}: {why}", path.display())]
+    CycloneDds {
+        /// Its file.
+        path: PathBuf,
+        /// What the system says.
+        why: std::io::Error,
+    },
 }
 
 /// What the shell opens for a configuration.

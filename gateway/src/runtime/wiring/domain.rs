@@ -47,7 +47,8 @@ pub(super) fn services(config: &Config) -> Vec<ServiceSpec> {
 pub(super) fn endpoints(config: &Config) -> Result<Vec<crate::bridge::dds::Endpoint>, super::OutsideError> {
     let endpoint = |dds: &Dds| {
         let read = |path: &std::path::PathBuf| {
-            std::fs::read_to_string(path).map_err(|why| super::OutsideError::CycloneDds(path.clone(), why))
+            std::fs::read_to_string(path)
+                .map_err(|why| super::OutsideError::CycloneDds { path: path.clone(), why })
         };
         Ok(crate::bridge::dds::Endpoint {
             source: source(config, dds),
