@@ -86,7 +86,9 @@ impl Directives {
                 condition.holds = condition.outer && !condition.held && met;
                 condition.held |= met;
             }
-            "endif" => drop(self.open.pop().ok_or("there is no `#if` before it")?),
+            "endif" => {
+                self.open.pop().ok_or("there is no `#if` before it")?;
+            }
             _ if !self.holds() => {}
             "include" => self.includes.push((line, included(rest)?)),
             "define" => match rest.split_once(char::is_whitespace) {
@@ -143,8 +145,8 @@ fn without_comments(text: &str) -> Result<String, usize> {
         rest = &rest[at..];
         let taken = if rest.starts_with("//") {
             rest.find('\n').unwrap_or(rest.len())
-        } else if rest.starts_with("/*") {
-            let end = rest[2..].find("*/").ok_or_else(|| line_of(rest))? + 4;
+        } else if let Some(inside) = rest.strip_prefix("/*") {
+            let end = inside.find("*/").ok_or_else(|| line_of(rest))? + 4;
             kept.push(' ');
             kept.extend(rest[..end].chars().filter(|c| *c == '\n'));
             end
