@@ -82,7 +82,7 @@ impl<'a> Lexer<'a> {
                 let word = self.skip_while(is_word);
                 Token::Word(word.strip_prefix('_').unwrap_or(word).to_owned())
             }
-            _ if first.is_ascii_digit() || self.rest.starts_with('.') => self.number()?,
+            _ if first.is_ascii_digit() || first == '.' => self.number()?,
             ':' if self.rest.starts_with("::") => {
                 self.skip(2);
                 Token::Scope

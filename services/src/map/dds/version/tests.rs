@@ -150,11 +150,8 @@ fn health_has_one_instance_a_code_in_the_one_and_one_altogether_in_the_other() {
     });
     let mut other = Translator::new().unwrap();
     for (newer, sample) in [(&ram6, &ram), (&rom6, &rom)] {
-        assert_eq!(
-            other.to_older(newer).samples,
-            std::slice::from_ref(sample),
-            "a status that is left out is empty"
-        );
+        let came = other.to_older(newer).samples;
+        assert_eq!(came, std::slice::from_ref(sample), "a status that is left out is empty");
     }
     let [ram_ends, rom_ends] =
         [&ram6, &rom6].map(|newer| ends(other.newer(), type_name, newer, Change::Dispose));
