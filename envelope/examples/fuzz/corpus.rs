@@ -1,6 +1,6 @@
 //! Sound inputs: objects of all types in each form, headers, frames.
 
-use crate::samples;
+use crate::samples::{self, Described};
 use aldis_envelope::codec::cdr::Schema;
 use aldis_envelope::codec::{native, stream, zmtp};
 use aldis_envelope::description::DescriptionError;
@@ -96,7 +96,7 @@ fn connection(random: &mut Rng, label: &Arc<Label>, content: &[u8]) -> Vec<u8> {
 }
 
 /// Every topic of Support Operations in both versions, appendable and final.
-pub(crate) fn schemas() -> Result<Vec<Schema>, Box<dyn Error>> {
+pub(crate) fn schemas() -> Result<Vec<Described>, Box<dyn Error>> {
     let unsound = |errors: Vec<DescriptionError>| format!("{errors:?}");
     let versions = [
         (v5_2_1::library().map_err(unsound)?, v5_2_1::described_topics()),
@@ -106,7 +106,7 @@ pub(crate) fn schemas() -> Result<Vec<Schema>, Box<dyn Error>> {
     for (library, topics) in &versions {
         for topic in topics {
             let schema = Schema::new(library, &topic.type_name)?;
-            schemas.extend([schema.as_final(), schema]);
+            schemas.extend([schema.as_final(), schema].map(|schema| (library.clone(), schema)));
         }
     }
     Ok(schemas)

@@ -1,7 +1,8 @@
 //! What is fed: each decoder of this crate, with what holds when it accepts an input.
 
 use crate::corpus::{Corpus, schemas};
-use aldis_envelope::codec::cdr::{KeySchema, Schema};
+use crate::samples::Described;
+use aldis_envelope::codec::cdr::KeySchema;
 use aldis_envelope::codec::{delimited, multipart, native, stream, zmtp};
 use aldis_envelope::description::Extensibility;
 use aldis_envelope::idl;
@@ -196,14 +197,14 @@ fn comes_back(object: &dyn lmcp::Object, again: Option<Box<dyn lmcp::Object>>) -
 }
 
 thread_local! {
-    static SCHEMAS: Vec<Schema> = schemas().unwrap_or_default();
+    static SCHEMAS: Vec<Described> = schemas().unwrap_or_default();
 }
 
 /// The first byte chooses the type, the rest is the sample. What was read is written and read again.
 fn read_cdr(input: &[u8], watch: &mut Watch<'_>) -> Outcome {
     let Some((chosen, sample)) = input.split_first() else { return Outcome::Refused };
     SCHEMAS.with(|schemas| {
-        let Some(schema) = schemas.get(usize::from(*chosen) % schemas.len().max(1)) else {
+        let Some((_, schema)) = schemas.get(usize::from(*chosen) % schemas.len().max(1)) else {
             return Outcome::Misread;
         };
         let mut read = None;

@@ -1,8 +1,12 @@
 //! Sound samples in CDR, and a sound text in IDL.
 
-use aldis_envelope::codec::cdr::{ByteOrder, Representation, Schema};
+use aldis_envelope::codec::cdr::{ByteOrder, Representation, Schema, Value};
+use aldis_envelope::description::{Definition, Library, Member, Resolved, Type};
 use fastrand::Rng;
 use std::error::Error;
+
+/// A type, and the library that it is of.
+pub(crate) type Described = (Library, Schema);
 
 /// Every construct of IDL that is read.
 pub(crate) const IDL: &str = r#"
@@ -23,39 +27,42 @@ module UMAA { module T { /* c */
 #endif
 "#;
 
-/// Bytes of zero are a sample of every type as long as they are enough: no list has an element, nothing optional is there. Random ones
-/// that are read, and what they are in other forms, hold more.
-pub(crate) fn samples(random: &mut Rng, schemas: &[Schema]) -> Result<Vec<Vec<u8>>, Box<dyn Error>> {
+/// Samples of each type in every form that it has, with anything in them.
+pub(crate) fn samples(random: &mut Rng, types: &[Described]) -> Result<Vec<Vec<u8>>, Box<dyn Error>> {
     let mut samples = Vec::new();
-    for (place, schema) in (0_u8..).zip(schemas) {
+    for (place, (library, schema)) in (0_u8..).zip(types) {
         let second = Representation::xcdr2(schema.extensibility());
-        let closed = schema.as_final();
-        let first = grown(random, &closed).ok_or("a type without a sample")?;
-        let value = closed.read(&first)?.value;
-        for representation in
-            [Representation::XCDR1, second, Representation { order: ByteOrder::Big, ..second }]
-        {
+        let big = Representation { order: ByteOrder::Big, ..second };
+        for representation in [Representation::XCDR1, second, big] {
+            let value = value(random, library, &Type::named(schema.type_name()));
             samples.push([vec![place], schema.write(&value, representation)?].concat());
         }
     }
     Ok(samples)
 }
 
-/// A sample in plain XCDR2 that is grown from zeros by small numbers which it can be read with.
-fn grown(random: &mut Rng, schema: &Schema) -> Option<Vec<u8>> {
-    let sound = |sample: &[u8]| schema.read(sample).is_ok_and(|read| !read.differs);
-    let mut sample = vec![0, 7, 0, 0];
-    while !sound(&sample) && sample.len() < 4_096 {
-        sample.push(0);
-    }
-    for _ in 0..400 {
-        let mut next = sample.clone();
-        let place = random.usize(4..next.len());
-        next[place] = random.u8(..4);
-        next.extend(vec![0; random.usize(..80)]);
-        if sound(&next) {
-            sample = next;
+/// A value of a type of Support Operations.
+fn value(random: &mut Rng, library: &Library, held: &Type) -> Value {
+    match library.resolved(held) {
+        Resolved::Plain(Type::Int32 | Type::Int64) => Value::Signed(random.i32(..).into()),
+        Resolved::Plain(Type::Float64) => Value::Float64(random.f64()),
+        Resolved::Plain(Type::String { .. }) => {
+            Value::Text((0..random.usize(..20)).map(|_| random.char('a'..='é')).collect())
         }
+        Resolved::Plain(Type::Sequence { element, .. }) => {
+            Value::List((0..random.usize(..4)).map(|_| value(random, library, element)).collect())
+        }
+        Resolved::Defined(_, Definition::Enumeration(known)) => {
+            Value::Enumeration(known.literals[random.usize(..known.literals.len())].1)
+        }
+        Resolved::Defined(_, Definition::Structure(structure)) => {
+            let member = |member: &Member| {
+                let absent = member.optional && random.bool();
+                (!absent).then(|| value(random, library, &member.r#type))
+            };
+            Value::Structure(structure.members.iter().map(member).collect())
+        }
+        // The only array is that of a GUID.
+        _ => Value::Octets(random.u128(..).to_be_bytes().to_vec()),
     }
-    sound(&sample).then_some(sample)
 }

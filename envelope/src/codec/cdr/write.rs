@@ -90,10 +90,6 @@ impl<'a, 'o, 's, S: Source<'s>> Writer<'a, 'o, S> {
                 let text = self.source.text();
                 let text = self.given(text)?;
                 self.bounded(text.len(), *bound)?;
-                // What ends a text cannot stand in it.
-                if text.contains('\0') {
-                    return Err(self.fault(CdrFault::NotText("free of zero bytes")));
-                }
                 self.length(text.len() + 1)?;
                 self.out.extend_from_slice(text.as_bytes());
                 self.out.push(0);
