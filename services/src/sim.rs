@@ -13,6 +13,7 @@ mod disk;
 mod faults;
 pub mod link;
 mod machine;
+pub mod mission;
 mod network;
 mod observe;
 pub mod offline;

@@ -5,6 +5,7 @@
 
 mod answers;
 mod arrivals;
+mod destination;
 mod services;
 mod tickets;
 
@@ -14,10 +15,8 @@ use crate::link::{
     self, BatchId, CarrierId, Link, LinkSpec, Offer, Record, Ticket, TicketState, record_prefix,
 };
 use crate::service::Level;
-use aldis_envelope::umaa::{CommandKey, Key};
 use aldis_envelope::{
-    Address, CallId, EntityId, Envelope, Fleet, GuidForm, Guids, Label, Message, Monotonic, Now, Prefix,
-    Source,
+    Address, CallId, EntityId, Envelope, Fleet, GuidForm, Guids, Label, Monotonic, Now, Prefix, Source,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -160,16 +159,6 @@ impl Links {
     fn give(&mut self, place: usize, event: link::Event) {
         self.all[place].events.push(event);
         self.due = true;
-    }
-
-    /// The entity that a message's content is for, where it can be told: a UMAA command names its provider in its key.
-    fn destination(&self, message: &Message) -> Option<EntityId> {
-        let topic = message.label.descriptor().strip_prefix("UMAA::")?;
-        if !topic.trim_end_matches("Type").ends_with("Command") {
-            return None;
-        }
-        let CommandKey { destination, .. } = CommandKey::of_instance(message.instance.as_deref()?)?;
-        self.guids.iter().find_map(|guids| guids.service(destination)).map(|source| source.entity)
     }
 }
 

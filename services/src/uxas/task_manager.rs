@@ -11,7 +11,7 @@
 //! service's ids. Configuration: `compat_cost`, and `[[service.task_option]]` with `task_id` or `task_type`, `name`, `value`.
 
 use super::coordinator::Coordinator;
-use super::machine::{FAILED_KEY, Heard, Machine, Post, REQUEST_KEY};
+use super::machine::{FAILED_KEY, Heard, LOST_KEY, Machine, Post, REQUEST_KEY};
 use super::task::life::{Context, Life, Numbers, TASK_KEY};
 use super::world::World;
 use aldis_envelope::Monotonic;
@@ -132,8 +132,13 @@ impl TaskManager {
         }
     }
 
-    fn status(&mut self, status: &ServiceStatus) {
+    fn status(&mut self, status: &ServiceStatus, is_own: bool) {
         let pairs: Vec<_> = status.info.iter().filter_map(|one| one.get()).collect();
+        let lost = pairs.iter().find(|pair| pair.key == LOST_KEY).and_then(|pair| pair.value.parse().ok());
+        // What another shore has lost may be what the own one has won.
+        if let Some(vehicle) = lost.filter(|_| is_own) {
+            self.lives.values_mut().for_each(|life| life.lost(vehicle));
+        }
         let is_failure =
             status.status_type == ServiceStatusType::Error && pairs.iter().any(|pair| pair.key == FAILED_KEY);
         let number =
@@ -212,7 +217,7 @@ impl Machine for TaskManager {
             gone.task_list.iter().for_each(|id| drop(self.lives.remove(id)));
             self.coordinator.remove(&gone.task_list);
         } else if let Some(status) = object.get::<ServiceStatus>() {
-            self.status(status);
+            self.status(status, heard.source.entity == post.source().entity);
         } else if !self.coordinator.take(object, post) {
             self.planning(object, post);
         }

@@ -40,6 +40,16 @@ impl Life {
         self.active.retain(|vehicle| self.assigned.contains(vehicle));
     }
 
+    /// A vehicle does not do its mission any more: where nobody else is assigned, the task is free and not complete.
+    pub fn lost(&mut self, vehicle: i64) {
+        self.sent.remove(&vehicle);
+        self.active.remove(&vehicle);
+        let is_done_with = matches!(self.state, State::OptionSelected | State::Active);
+        if self.assigned.remove(&vehicle) && self.assigned.is_empty() && is_done_with {
+            self.state.step(Trigger::Dropped);
+        }
+    }
+
     /// A new request takes the task from who is at it: that is complete.
     pub(super) fn interrupt(&mut self, context: &mut Context<'_, '_>) {
         if self.state == State::Active {
