@@ -63,6 +63,9 @@ impl TaskManagerConfig {
     }
 }
 
+/// How much older than the newest a state may be that was overtaken, in milliseconds.
+const OVERTAKEN_MS: i64 = 60_000;
+
 /// The machine.
 pub struct TaskManager {
     config: TaskManagerConfig,
@@ -108,6 +111,13 @@ impl TaskManager {
                 post.status(ServiceStatusType::Error, &pairs);
             }
         }
+    }
+
+    /// Whether a state was overtaken by a newer one: what it says is over. A vehicle whose clock was set back is believed.
+    fn is_old(&self, state: &EntityState) -> bool {
+        let newest = self.world.states.get(&state.id).and_then(|known| known.get::<EntityState>());
+        let behind = newest.map_or(0, |newest| newest.time.saturating_sub(state.time));
+        state.time > 0 && (1..=OVERTAKEN_MS).contains(&behind)
     }
 
     /// Lets every task do something.
@@ -204,6 +214,11 @@ impl Machine for TaskManager {
 
     fn take(&mut self, heard: &Heard<'_>, post: &mut Post<'_>) {
         let object = heard.object;
+        if let Some(state) = object.get::<EntityState>()
+            && self.is_old(state)
+        {
+            return;
+        }
         if self.world.take(object) {
             if let Some(state) = object.get::<EntityState>() {
                 self.each(post, |life, context| life.state_of(state, context));
