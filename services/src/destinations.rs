@@ -4,6 +4,8 @@
 //! `source` is where commands to it must go.
 
 use crate::dds::Pattern;
+use aldis_envelope::lmcp::cmasi::VehicleActionCommand;
+use aldis_envelope::lmcp::{self, Header, Struct};
 use aldis_envelope::umaa::{self, CommandKey, Key};
 use aldis_envelope::{ContentType, EntityId, Fleet, Guid, GuidForm, Guids, Instance, KeyHash, Message};
 use std::collections::BTreeMap;
@@ -85,6 +87,9 @@ impl Destinations {
     /// Where a message goes: a command, also the dispose that cancels it, towards its destination.
     pub fn of_message(&self, message: &Message) -> Destination {
         let descriptor = message.label.descriptor();
+        if message.label.attributes.content_type == ContentType::Lmcp {
+            return vehicle_of(&message.content).map_or(Destination::Everybody, Destination::Entity);
+        }
         if Pattern::of(descriptor) != Some(Pattern::Command) {
             return Destination::Everybody;
         }
@@ -95,6 +100,17 @@ impl Destinations {
             None => Destination::Everybody,
         }
     }
+}
+
+/// The vehicle that a command of LMCP is for.
+fn vehicle_of(content: &[u8]) -> Option<EntityId> {
+    let info = Header::peek(content).ok()?.type_info().ok()?;
+    if !info.is_a(VehicleActionCommand::TYPE) {
+        return None;
+    }
+    let object = lmcp::decode(content).ok()?;
+    let number = object.get::<VehicleActionCommand>()?.vehicle_id;
+    u64::try_from(number).ok().and_then(|number| EntityId::new(number).ok())
 }
 
 /// The destination in a command's key: GUIDs in 5.2.1; in 6.0 source and destination have their parents behind them.

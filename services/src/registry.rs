@@ -92,7 +92,7 @@ pub fn service(source: Source, name: &str, kind: Kind, guids: &Guids) -> Service
             Kind::Recorder(recording) => Box::new(Recorder::new(recording.clone())),
             Kind::Entities => Box::new(Entities::default()),
             Kind::Track(track) => Box::new(Track::new(source, track.clone())),
-            Kind::Core(core) => core.service(),
+            Kind::Core(core) => core.service(source, &guids),
         }
     });
     ServiceSpec { source, name: name.to_owned(), factory }

@@ -15,6 +15,7 @@ mod disk;
 mod faults;
 pub mod link;
 mod machine;
+pub mod mission;
 mod network;
 mod observe;
 pub mod offline;

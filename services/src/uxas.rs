@@ -18,6 +18,7 @@
 pub mod aggregator;
 pub mod builder;
 pub mod clearance;
+pub mod control;
 pub mod coordinator;
 pub mod ground;
 pub mod kinematic;
@@ -34,6 +35,8 @@ pub mod waypoint_manager;
 pub mod world;
 
 use crate::service::Service;
+use aldis_envelope::{Guids, Source};
+use control::{ControlledMissions, GuardedVehicle};
 use machine::Hosted;
 
 /// A core service with its configuration.
@@ -57,13 +60,17 @@ pub enum Core {
     Sensors,
     /// Serves a vehicle its mission.
     Waypoints(waypoint_manager::WaypointConfig),
+    /// Serves a vehicle its mission while it is in control of it.
+    ControlledWaypoints(waypoint_manager::WaypointConfig, control::Control),
     /// Moves as a vehicle does.
     Kinematic(kinematic::KinematicConfig),
+    /// Moves as a vehicle does, for who is in control of it.
+    GuardedKinematic(kinematic::KinematicConfig, control::Control),
 }
 
 impl Core {
-    /// The service.
-    pub fn service(&self) -> Box<dyn Service> {
+    /// The service with these ids.
+    pub fn service(&self, source: Source, guids: &Guids) -> Box<dyn Service> {
         match self {
             Self::Validator(config) => Box::new(Hosted::new(validator::Validator::new(*config))),
             Self::Tasks(config) => Box::new(Hosted::new(task_manager::TaskManager::new(config.clone()))),
@@ -75,6 +82,12 @@ impl Core {
             Self::Sensors => Box::new(Hosted::new(sensor_manager::SensorManager::default())),
             Self::Waypoints(config) => Box::new(Hosted::new(waypoint_manager::WaypointManager::new(*config))),
             Self::Kinematic(config) => Box::new(Hosted::new(kinematic::Kinematic::new(*config))),
+            Self::ControlledWaypoints(config, control) => {
+                Box::new(ControlledMissions::new(source, guids, *config, control.clone()))
+            }
+            Self::GuardedKinematic(config, control) => {
+                Box::new(GuardedVehicle::new(source, guids, *config, control.clone()))
+            }
         }
     }
 
@@ -89,8 +102,8 @@ impl Core {
             Self::Builder(_) => "PlanBuilder",
             Self::Region(_) => "OperatingRegionState",
             Self::Sensors => "SensorManager",
-            Self::Waypoints(_) => "WaypointPlanManager",
-            Self::Kinematic(_) => "Vehicle",
+            Self::Waypoints(_) | Self::ControlledWaypoints(..) => "WaypointPlanManager",
+            Self::Kinematic(_) | Self::GuardedKinematic(..) => "Vehicle",
         }
     }
 

@@ -1,41 +1,48 @@
 //! `aldis simulate`: plans a scenario, and simulated vehicles do it.
 
+mod control;
+mod fleet;
+
 use super::exit::Failure;
 use super::plan::outcome::{self, Outcome};
 use super::plan::scenario::Scenario;
-use super::plan::until_answered;
 use super::print_line;
 use aldis_envelope::Monotonic;
-use aldis_envelope::lmcp::cmasi::{AutomationRequest, EntityConfiguration, EntityState};
+use aldis_envelope::lmcp::Object;
+use aldis_envelope::lmcp::cmasi::{AutomationRequest, EntityState, ServiceStatus};
 use aldis_envelope::lmcp::decode;
 use aldis_envelope::lmcp::impact::ImpactAutomationRequest;
 use aldis_envelope::lmcp::uxtask::{
     CoordinatedAutomationRequest, TaskActive, TaskAutomationRequest, TaskComplete,
 };
-use aldis_envelope::lmcp::{Object, Struct};
-use aldis_services::registry::Kind;
-use aldis_services::sim::offline::{Offline, Overheard, Played};
-use aldis_services::uxas::Core;
+use aldis_services::sim::link::Profile;
+use aldis_services::sim::offline::Overheard;
 use aldis_services::uxas::clearance::clearance_m;
-use aldis_services::uxas::kinematic::KinematicConfig;
+use aldis_services::uxas::machine::LOST_KEY;
 use aldis_services::uxas::vehicle::Vehicle;
-use aldis_services::uxas::waypoint_manager::WaypointConfig;
 use aldis_services::uxas::world::World;
+use control::ControlFile;
+use fleet::Fleet;
 use serde_json::json;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// How often vehicles tell their states, in virtual time.
-const PERIOD: Duration = Duration::from_millis(500);
+/// How long vehicles are looked at after a mission has lost its control.
+const AFTER_LOSS: Duration = Duration::from_secs(60);
 
 /// Plan a scenario and let simulated vehicles do it, in virtual time, until all tasks are complete.
 ///
 /// DIR is as for `aldis plan`. Every vehicle with a configuration and a state turns no tighter than it may, is served its mission
 /// in segments, and reports where it is; so tasks become active and complete. How near each came to a zone is measured from
 /// its track.
+///
+/// With `--link` the planner is ashore and each vehicle is a node of its own behind a bad link. A `control.toml` in DIR names the
+/// resource that the planner must control before a vehicle follows it, and who takes it over when.
 #[derive(clap::Args)]
-#[command(after_help = "Example:\n  aldis simulate configs/scenarios/harbour --json")]
+#[command(
+    after_help = "Examples:\n  aldis simulate configs/scenarios/harbour --json\n  aldis simulate configs/scenarios/harbour --link L1\n  aldis simulate configs/scenarios/loss-of-control"
+)]
 pub(crate) struct Simulate {
     /// The scenario.
     #[arg(value_name = "DIR")]
@@ -43,8 +50,14 @@ pub(crate) struct Simulate {
     /// The longest simulated time, in seconds.
     #[arg(long, default_value_t = 36_000)]
     seconds: u64,
+    /// Put every vehicle behind a link: L1, L2, L3, L4 or WiFi.
+    #[arg(long, value_name = "PROFILE")]
+    link: Option<String>,
+    /// What the troubles of the links are drawn from.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
     /// One JSON object: `seconds` (simulated), `tasks` (`task`, `active_s`, `complete_s`), `vehicles` (`vehicle`, `clearance_m`
-    /// beyond the zones' padding), `errors`.
+    /// beyond the zones' padding, `speed_m_per_s` at the end), `lost` (`vehicle`, `why`), `link_bytes`, `errors`.
     #[arg(long)]
     json: bool,
 }
@@ -57,37 +70,48 @@ struct Run {
     active: BTreeMap<i64, f64>,
     complete: BTreeMap<i64, f64>,
     clearance: BTreeMap<i64, f64>,
+    speed: BTreeMap<i64, f32>,
+    /// Missions that lost their control, by vehicle, and why.
+    lost: BTreeMap<i64, String>,
+    is_ending: bool,
+    link_bytes: u64,
 }
 
 impl Simulate {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let scenario = Scenario::read(&self.directory)?;
+        let control = ControlFile::read(&self.directory)?;
+        let profile = self.link.as_deref().map(profile).transpose()?;
         let mut run = Run::default();
         for object in scenario.all() {
             run.world.take(object);
         }
-        let mut node = Offline::new(scenario.entity, services(&scenario)).map_err(Failure::Failed)?;
-        node.play(scenario.told().into_iter().map(|object| Played { at: Duration::ZERO, object }).collect());
+        let mut fleet = Fleet::new(&scenario, control.as_ref(), profile.as_ref(), self.seed)?;
         let mut outcome = Outcome::default();
         let mut tasks = BTreeSet::new();
         for (_, object) in scenario.requests() {
             let (region, list) = asked(object.as_ref());
             tasks.extend(list);
             run.region = region;
-            let at = node.now().elapsed();
-            node.play(vec![Played { at, object }]);
-            let heard = until_answered(&mut node);
+            let heard = fleet.ask(object);
             outcome::hear(&mut outcome, &heard);
             heard.iter().for_each(|one| run.hear(one));
         }
         let mut errors = outcome.errors;
-        let until = Monotonic::since_start(Duration::from_secs(self.seconds));
+        let mut until = Monotonic::since_start(Duration::from_secs(self.seconds));
         while errors.is_empty() && !tasks.iter().all(|task| run.complete.contains_key(task)) {
-            if !node.step(until) {
+            let goes_on = fleet.step(until);
+            fleet.heard().iter().for_each(|one| run.hear(one));
+            if !goes_on {
                 let open: Vec<_> = tasks.iter().filter(|task| !run.complete.contains_key(task)).collect();
-                errors.push(format!("task {open:?} is not complete after {} s", self.seconds));
+                let seconds = fleet.now().elapsed().as_secs();
+                errors.extend(run.lost.values().cloned());
+                errors.push(format!("task {open:?} is not complete after {seconds} s"));
+            } else if !run.lost.is_empty() && !run.is_ending {
+                // Nobody does what is left: what the vehicles do now is looked at, and nothing more.
+                run.is_ending = true;
+                until = until.min(fleet.now() + AFTER_LOSS);
             }
-            node.heard().iter().for_each(|one| run.hear(one));
         }
         for (vehicle, clearance) in run.clearance.iter().filter(|(_, clearance)| **clearance < 0.0) {
             errors.push(format!(
@@ -95,7 +119,8 @@ impl Simulate {
                 -clearance
             ));
         }
-        run.print(self.json, node.now().elapsed().as_secs_f64(), &errors);
+        run.link_bytes = fleet.link_bytes();
+        run.print(self.json, fleet.now().elapsed().as_secs_f64(), &errors);
         match errors.is_empty() {
             true => Ok(()),
             false => Err(Failure::Failed(format!("{}: {}", self.directory.display(), errors.join("; ")))),
@@ -103,19 +128,12 @@ impl Simulate {
     }
 }
 
-/// The core services, and for each vehicle the vehicle itself and the manager of its mission.
-fn services(scenario: &Scenario) -> Vec<(String, Kind)> {
-    let mut all = Core::pipeline(false, 0.0);
-    let states: BTreeSet<i64> =
-        scenario.all().filter_map(|object| object.get::<EntityState>()).map(|state| state.id).collect();
-    for object in scenario.all().filter(|object| object.is_a(EntityConfiguration::TYPE)) {
-        let Some(vehicle) = Vehicle::of(object).filter(|vehicle| states.contains(&vehicle.id)) else {
-            continue;
-        };
-        all.push(Core::Waypoints(WaypointConfig::of(vehicle.id)));
-        all.push(Core::Kinematic(KinematicConfig { vehicle: vehicle.id, period: PERIOD }));
-    }
-    all.into_iter().map(|core| (core.name().to_owned(), Kind::Core(core))).collect()
+/// A link's profile by its name.
+fn profile(name: &str) -> Result<Profile, Failure> {
+    Profile::named(name).ok_or_else(|| {
+        let names: Vec<_> = Profile::ALL.iter().map(|profile| profile.name).collect();
+        Failure::Usage(format!("`{name}` is no profile of a link: give one of {}", names.join(", ")))
+    })
 }
 
 /// The region and the tasks of a request.
@@ -131,7 +149,7 @@ fn asked(object: &dyn Object) -> (i64, Vec<i64>) {
 
 impl Run {
     fn hear(&mut self, one: &Overheard) {
-        let wanted = ["State", "TaskActive", "TaskComplete"];
+        let wanted = ["State", "TaskActive", "TaskComplete", "ServiceStatus"];
         if !wanted.iter().any(|word| one.descriptor.ends_with(word)) {
             return;
         }
@@ -141,9 +159,26 @@ impl Run {
             self.active.entry(active.task_id).or_insert(seconds);
         } else if let Some(complete) = object.get::<TaskComplete>() {
             self.complete.insert(complete.task_id, seconds);
-        } else if let Some(state) = object.get::<EntityState>()
-            && let Some(vehicle) =
-                self.world.configurations.get(&state.id).and_then(|found| Vehicle::of(found.as_ref()))
+        } else if let Some(status) = object.get::<ServiceStatus>() {
+            self.status(status);
+        } else if let Some(state) = object.get::<EntityState>() {
+            self.state(state);
+        }
+    }
+
+    /// A mission may have lost its control.
+    fn status(&mut self, status: &ServiceStatus) {
+        let pairs: Vec<_> = status.info.iter().filter_map(|pair| pair.get()).collect();
+        let vehicle = pairs.iter().find(|pair| pair.key == LOST_KEY).and_then(|pair| pair.value.parse().ok());
+        if let (Some(vehicle), Some(why)) = (vehicle, pairs.first()) {
+            self.lost.entry(vehicle).or_insert_with(|| why.value.to_string());
+        }
+    }
+
+    fn state(&mut self, state: &EntityState) {
+        self.speed.insert(state.id, state.groundspeed);
+        if let Some(vehicle) =
+            self.world.configurations.get(&state.id).and_then(|found| Vehicle::of(found.as_ref()))
             && let Some(at) = state.location.get()
             && let Some(clearance) = clearance_m(&self.world, self.region, &vehicle, at)
         {
@@ -158,9 +193,15 @@ impl Run {
                 json!({ "task": task, "active_s": self.active.get(task), "complete_s": complete })
             }).collect();
             let vehicles: Vec<_> = self.clearance.iter().map(|(vehicle, clearance)| {
-                json!({ "vehicle": vehicle, "clearance_m": (clearance * 100.0).round() / 100.0 })
+                let clearance = (clearance * 100.0).round() / 100.0;
+                json!({ "vehicle": vehicle, "clearance_m": clearance, "speed_m_per_s": self.speed.get(vehicle) })
             }).collect();
-            print_line(json!({ "seconds": seconds, "tasks": tasks, "vehicles": vehicles, "errors": errors }));
+            let lost: Vec<_> =
+                self.lost.iter().map(|(vehicle, why)| json!({ "vehicle": vehicle, "why": why })).collect();
+            print_line(json!({
+                "seconds": seconds, "tasks": tasks, "vehicles": vehicles, "lost": lost,
+                "link_bytes": self.link_bytes, "errors": errors,
+            }));
             return;
         }
         for (task, complete) in &self.complete {

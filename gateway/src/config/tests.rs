@@ -319,7 +319,9 @@ fn files_are_looked_for_beside_the_configuration() {
 fn core_services_are_named_with_their_keys_and_checked() {
     let core = "[[service]]\nkind = \"waypoint-plan-manager\"\nservice = 110\nnumber_waypoints_to_serve = 15\n\
                 [[service]]\nkind = \"assignment-tree-branch-bound\"\nservice = 111\ncost_function = \"CUMULATIVE\"\n\
-                [[service]]\nkind = \"task-manager\"\nservice = 112\noptions = [{ task_id = 7, name = \"a\", value = \"b\" }]\n";
+                [[service]]\nkind = \"task-manager\"\nservice = 112\noptions = [{ task_id = 7, name = \"a\", value = \"b\" }]\n\
+                [[service]]\nkind = \"waypoint-plan-manager\"\nservice = 113\nresource = \"autopilot\"\ncontrol_s = 20\n\
+                [[service]]\nkind = \"simulated-vehicle\"\nservice = 114\nresource = \"autopilot\"\n";
     let config = Config::parse("", &format!("{TOP}{core}")).unwrap();
     let cores: Vec<_> =
         config.services.iter().map(|one| one.core().unwrap().core(config.entities.own())).collect();
@@ -330,6 +332,12 @@ fn core_services_are_named_with_their_keys_and_checked() {
         cores[0]
     );
     assert!(format!("{:?}", cores[1]).contains("Cumulative"));
+    let under = format!("{:?}", cores[3]);
+    assert!(
+        under.contains("ControlledWaypoints") && under.contains("\"autopilot\", duration: 20s"),
+        "{under}"
+    );
+    assert!(format!("{:?}", cores[4]).contains("GuardedKinematic"));
     assert_eq!(config.services[2].service().get(), 112);
     for (table, what) in [
         ("[[service]]\nkind = \"plan-builder\"\n", "has no `service`"),

@@ -3,6 +3,7 @@
 use super::error::Fault;
 use super::schema;
 use super::service::SERVICE_MIN;
+use super::text::PlainName;
 use aldis_envelope::lmcp::cmasi::TurnType;
 use aldis_envelope::{EntityId, ServiceId};
 use aldis_services::plan::algebra::Unnamed;
@@ -10,6 +11,7 @@ use aldis_services::plan::assignment::{Objective, Precedence};
 use aldis_services::uxas::Core;
 use aldis_services::uxas::aggregator::AggregatorConfig;
 use aldis_services::uxas::builder::BuilderConfig;
+use aldis_services::uxas::control::Control;
 use aldis_services::uxas::kinematic::KinematicConfig;
 use aldis_services::uxas::planner::PlannerConfig;
 use aldis_services::uxas::task_manager::{TaskManagerConfig, TaskOptionRule};
@@ -209,7 +211,12 @@ tables! {
         turn_type: Turn = Turn::TurnShort,
         /// The gimbal that is pointed down at the end of a segment. Default: none.
         gimbal_payload: Option<i64> = None,
-    } => |table, entity| Core::Waypoints(WaypointConfig {
+        /// The resource of the vehicle's entity that has to be controlled before a mission goes out; it is asked for at service 10
+        /// of that entity. Missions of this entity alone are served then. Default: none, missions go out at once.
+        resource: Option<PlainName> = None,
+        /// For how long control is asked for at a time, in seconds; it is renewed at half of it. Default: 60.
+        control_s: u32 = 60,
+    } => |table, entity| controlled(table, WaypointConfig {
         number_waypoints_to_serve: table.number_waypoints_to_serve as usize,
         number_waypoints_overlap: table.number_waypoints_overlap as usize,
         default_loiter_radius_m: table.default_loiter_radius_m,
@@ -220,7 +227,7 @@ tables! {
         turn_type: table.turn_type.turn_type(),
         gimbal_payload: table.gimbal_payload,
         ..WaypointConfig::of(table.vehicle.unwrap_or(number(entity)))
-    });
+    }, entity);
 
     /// A simulated vehicle that follows its missions.
     SimulatedVehicle {
@@ -228,10 +235,39 @@ tables! {
         vehicle: Option<i64> = None,
         /// How often it tells its state, in milliseconds; at least 10. Default: 1000.
         period_ms: u32 = 1000,
-    } => |table, entity| Core::Kinematic(KinematicConfig {
+        /// The resource of its entity that the sender of a mission has to control. Default: none, it follows every mission.
+        resource: Option<PlainName> = None,
+    } => |table, entity| guarded(table.resource.as_ref(), KinematicConfig {
         vehicle: table.vehicle.unwrap_or(number(entity)),
         period: Duration::from_millis(u64::from(table.period_ms)),
-    });
+    }, entity);
+}
+
+/// The manager of a vehicle's mission, under control where a resource is named.
+fn controlled(table: &WaypointPlanManager, config: WaypointConfig, entity: EntityId) -> Core {
+    match &table.resource {
+        Some(name) => {
+            let duration = Duration::from_secs(u64::from(table.control_s.max(1)));
+            let control = Control::of(vehicle(config.vehicle, entity), name.as_str());
+            Core::ControlledWaypoints(config, Control { duration, ..control })
+        }
+        None => Core::Waypoints(config),
+    }
+}
+
+/// A simulated vehicle, guarded where a resource is named.
+fn guarded(resource: Option<&PlainName>, config: KinematicConfig, entity: EntityId) -> Core {
+    match resource {
+        Some(name) => {
+            Core::GuardedKinematic(config, Control::of(vehicle(config.vehicle, entity), name.as_str()))
+        }
+        None => Core::Kinematic(config),
+    }
+}
+
+/// The entity of a vehicle; where its number is none, that of its service.
+fn vehicle(number: i64, entity: EntityId) -> EntityId {
+    u64::try_from(number).ok().and_then(|number| EntityId::new(number).ok()).unwrap_or(entity)
 }
 
 /// An entity's id as LMCP counts.

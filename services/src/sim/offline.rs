@@ -14,10 +14,10 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// The first service id that is given to services.
-const FIRST_SERVICE: u64 = 100;
+pub(super) const FIRST_SERVICE: u64 = 100;
 
 /// The id of the service that plays.
-const PLAYER: u64 = 9000;
+pub(super) const PLAYER: u64 = 9000;
 
 /// A message that is played, and when.
 pub struct Played {
@@ -39,12 +39,12 @@ pub struct Overheard {
 }
 
 /// What is to be played, in the order of its times.
-type Queue = Arc<Mutex<Vec<Played>>>;
+pub(super) type Queue = Arc<Mutex<Vec<Played>>>;
 
 /// Plays messages and hears all others.
-struct Player {
-    queue: Queue,
-    heard: Sender<Overheard>,
+pub(super) struct Player {
+    pub(super) queue: Queue,
+    pub(super) heard: Sender<Overheard>,
 }
 
 impl Service for Player {

@@ -48,6 +48,14 @@ struct Hold {
     radius_m: f64,
 }
 
+impl Hold {
+    /// Until the next mission.
+    fn for_good(vehicle: &Vehicle) -> Self {
+        let radius_m = vehicle.loiter_radius_m().max(vehicle.turn_radius_m);
+        Self { left_s: None, circles: vehicle.medium == Medium::Air, radius_m }
+    }
+}
+
 /// The machine.
 pub struct Kinematic {
     config: KinematicConfig,
@@ -99,6 +107,20 @@ impl Kinematic {
         self.head_for(mission.first_waypoint);
     }
 
+    /// Goes no further: aircraft circle, all others hold their place. The tasks that it was at stay those of its state, because
+    /// they are not done. The number of the mission, where the vehicle was not waiting already.
+    pub(super) fn halt(&mut self, post: &mut Post<'_>) -> Option<i64> {
+        let waits = self.hold.is_some_and(|hold| hold.left_s.is_none());
+        let vehicle = self.vehicle.filter(|_| self.target.is_some() && !waits)?;
+        let hold = Hold::for_good(&vehicle);
+        if let Some(motion) = self.motion.as_mut().filter(|_| !hold.circles) {
+            motion.rest();
+        }
+        self.hold = Some(hold);
+        self.tell(post);
+        Some(self.command)
+    }
+
     fn head_for(&mut self, number: i64) {
         let (Some(motion), Some(next)) = (&mut self.motion, self.waypoints.get(&number)) else { return };
         let after = self.waypoints.get(&next.next_waypoint).filter(|after| after.number != number);
@@ -128,12 +150,7 @@ impl Kinematic {
         self.hold = None;
         if waypoint.next_waypoint == waypoint.number || !self.waypoints.contains_key(&waypoint.next_waypoint)
         {
-            let circles = vehicle.medium == Medium::Air;
-            self.hold = Some(Hold {
-                left_s: None,
-                circles,
-                radius_m: vehicle.loiter_radius_m().max(vehicle.turn_radius_m),
-            });
+            self.hold = Some(Hold::for_good(&vehicle));
         } else {
             self.head_for(waypoint.next_waypoint);
         }

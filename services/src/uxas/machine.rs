@@ -11,6 +11,9 @@ use std::sync::Arc;
 /// The key of the pair in a [`ServiceStatus`] that names the request which failed.
 pub const REQUEST_KEY: &str = "RequestID";
 
+/// The key of the pair in a [`ServiceStatus`] that names the vehicle whose mission is lost: whoever served it is not in control.
+pub const LOST_KEY: &str = "MissionLost";
+
 /// The key of the pair that says why a request has no plan, as the reference writes it.
 pub const FAILED_KEY: &str = "No UniqueAutomationResponse";
 
@@ -166,6 +169,11 @@ impl<M: Machine> Hosted<M> {
         types.sort_by_key(|info| info.full_name);
         types.dedup_by_key(|info| info.full_name);
         Self { machine, types }
+    }
+
+    /// The machine itself, for services that stand around it.
+    pub(super) fn machine(&mut self) -> &mut M {
+        &mut self.machine
     }
 
     fn message(&mut self, now: Now, envelope: &Envelope, out: &mut Outbox) {

@@ -11,7 +11,7 @@
 //! service's ids. Configuration: `compat_cost`, and `[[service.task_option]]` with `task_id` or `task_type`, `name`, `value`.
 
 use super::coordinator::Coordinator;
-use super::machine::{FAILED_KEY, Heard, Machine, Post, REQUEST_KEY};
+use super::machine::{FAILED_KEY, Heard, LOST_KEY, Machine, Post, REQUEST_KEY};
 use super::task::life::{Context, Life, Numbers, TASK_KEY};
 use super::world::World;
 use aldis_envelope::Monotonic;
@@ -63,6 +63,9 @@ impl TaskManagerConfig {
     }
 }
 
+/// How much older than the newest a state may be that was overtaken, in milliseconds.
+const OVERTAKEN_MS: i64 = 60_000;
+
 /// The machine.
 pub struct TaskManager {
     config: TaskManagerConfig,
@@ -110,6 +113,13 @@ impl TaskManager {
         }
     }
 
+    /// Whether a state was overtaken by a newer one: what it says is over. A vehicle whose clock was set back is believed.
+    fn is_old(&self, state: &EntityState) -> bool {
+        let newest = self.world.states.get(&state.id).and_then(|known| known.get::<EntityState>());
+        let behind = newest.map_or(0, |newest| newest.time.saturating_sub(state.time));
+        state.time > 0 && (1..=OVERTAKEN_MS).contains(&behind)
+    }
+
     /// Lets every task do something.
     fn each(&mut self, post: &mut Post<'_>, mut act: impl FnMut(&mut Life, &mut Context<'_, '_>)) {
         let Self { config, world, lives, numbers, summaries, .. } = self;
@@ -132,8 +142,13 @@ impl TaskManager {
         }
     }
 
-    fn status(&mut self, status: &ServiceStatus) {
+    fn status(&mut self, status: &ServiceStatus, is_own: bool) {
         let pairs: Vec<_> = status.info.iter().filter_map(|one| one.get()).collect();
+        let lost = pairs.iter().find(|pair| pair.key == LOST_KEY).and_then(|pair| pair.value.parse().ok());
+        // What another shore has lost may be what the own one has won.
+        if let Some(vehicle) = lost.filter(|_| is_own) {
+            self.lives.values_mut().for_each(|life| life.lost(vehicle));
+        }
         let is_failure =
             status.status_type == ServiceStatusType::Error && pairs.iter().any(|pair| pair.key == FAILED_KEY);
         let number =
@@ -199,6 +214,11 @@ impl Machine for TaskManager {
 
     fn take(&mut self, heard: &Heard<'_>, post: &mut Post<'_>) {
         let object = heard.object;
+        if let Some(state) = object.get::<EntityState>()
+            && self.is_old(state)
+        {
+            return;
+        }
         if self.world.take(object) {
             if let Some(state) = object.get::<EntityState>() {
                 self.each(post, |life, context| life.state_of(state, context));
@@ -212,7 +232,7 @@ impl Machine for TaskManager {
             gone.task_list.iter().for_each(|id| drop(self.lives.remove(id)));
             self.coordinator.remove(&gone.task_list);
         } else if let Some(status) = object.get::<ServiceStatus>() {
-            self.status(status);
+            self.status(status, heard.source.entity == post.source().entity);
         } else if !self.coordinator.take(object, post) {
             self.planning(object, post);
         }

@@ -21,7 +21,7 @@ use super::vehicle::Vehicle;
 use aldis_envelope::Monotonic;
 use aldis_envelope::lmcp::cmasi::{
     AutomationResponse, CommandStatusType, EntityConfiguration, EntityState, GimbalAngleAction,
-    MissionCommand, ServiceStatusType, TurnType, Waypoint,
+    MissionCommand, NavigationMode, ServiceStatusType, TurnType, Waypoint,
 };
 use aldis_envelope::lmcp::{Object, Ref, Struct, TypeInfo};
 pub use segments::{order, segments};
@@ -125,6 +125,29 @@ impl WaypointManager {
         self.serve(post);
     }
 
+    /// Serves nothing more of the mission; its number, where there was one.
+    pub(super) fn drop_mission(&mut self) -> Option<i64> {
+        let had = !self.segments.is_empty();
+        (self.segments, self.served, self.due) = (Vec::new(), None, None);
+        had.then_some(self.mission.command_id)
+    }
+
+    /// Whether a state says that the vehicle stays at the end of the mission.
+    pub(super) fn is_done(&self, state: &EntityState) -> bool {
+        let last = self.segments.last().and_then(|segment| segment.last());
+        state.id == self.config.vehicle
+            && state.mode == NavigationMode::Loiter
+            && state.current_command == self.command_id(self.last_command)
+            && last.is_some_and(|last| {
+                state.current_waypoint == last.number && last.next_waypoint == last.number
+            })
+    }
+
+    /// The number of a command that serves the mission.
+    fn command_id(&self, number: i64) -> i64 {
+        (self.mission.command_id << 16) | number
+    }
+
     /// What happens at the end of the mission.
     fn finish(&self, plan: &mut [Waypoint]) {
         let first_task = plan.iter().find(|at| !at.associated_tasks.is_empty()).map(|at| at.number);
@@ -190,7 +213,7 @@ impl WaypointManager {
         self.last_command += 1;
         let mut command = MissionCommand { first_waypoint: first, ..MissionCommand::default() };
         command.vehicle_id = self.config.vehicle;
-        command.command_id = (self.mission.command_id << 16) | self.last_command;
+        command.command_id = self.command_id(self.last_command);
         command.status = CommandStatusType::Approved;
         command.vehicle_action_list.clone_from(&self.mission.vehicle_action_list);
         command.waypoint_list = list.into_iter().map(Ref::new).collect();

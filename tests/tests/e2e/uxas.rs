@@ -4,7 +4,7 @@ use aldis_envelope::lmcp::cmasi::{
     AirVehicleState, EntityState, KeyValuePair, ServiceStatus, ServiceStatusType,
 };
 use aldis_envelope::lmcp::{self, Object, Ref};
-use aldis_tests::{Directory, Node, Site, aldis, delimited, frame, free_port, shared, until};
+use aldis_tests::{Directory, Node, Site, aldis, delimited, frame, free_port, root, shared, until};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -160,4 +160,34 @@ fn states_are_held_with_their_ages_and_recorded_and_errors_of_services_are_healt
     let mut files: Vec<_> = std::fs::read_dir(&kept).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();
     assert_eq!(files.len(), 2, "four messages, two a file: {files:?}");
+}
+
+#[test]
+fn a_mission_ends_with_its_control_and_says_why() {
+    let scenario = root().join("configs/scenarios/loss-of-control");
+    let done = aldis(["simulate".as_ref(), scenario.as_os_str(), "--json".as_ref()]);
+    assert_eq!(done.code, Some(1), "{done:?}");
+    let told: Value = serde_json::from_str(&done.stdout).unwrap();
+    let complete: Vec<_> = told["tasks"].as_array().unwrap().iter().map(|task| &task["task"]).collect();
+    assert_eq!(complete, [1], "the second was under way");
+    assert_eq!(told["lost"][0]["vehicle"], 471);
+    let why = told["lost"][0]["why"].as_str().unwrap();
+    assert!(why.contains("control is lost of `autopilot`") && why.contains("took over"), "{why}");
+    assert_eq!(told["vehicles"][0]["speed_m_per_s"], 0.0, "it holds its place");
+}
+
+#[test]
+fn a_scenario_is_done_across_bad_links() {
+    let scenario = root().join("configs/scenarios/escort");
+    let done = aldis([
+        "simulate".as_ref(),
+        scenario.as_os_str(),
+        "--link".as_ref(),
+        "L1".as_ref(),
+        "--json".as_ref(),
+    ]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    let told: Value = serde_json::from_str(&done.stdout).unwrap();
+    assert_eq!(told["tasks"].as_array().unwrap().len(), 1);
+    assert!(told["link_bytes"].as_u64().unwrap() > 10_000, "{told}");
 }

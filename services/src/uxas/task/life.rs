@@ -102,6 +102,8 @@ pub struct Life {
     assigned: BTreeSet<i64>,
     active: BTreeSet<i64>,
     sent: BTreeMap<i64, Sent>,
+    /// By vehicle, what follows the task in its mission.
+    passed: BTreeMap<i64, execution::Passed>,
     /// What it lacks, as far as that was told.
     told: Option<String>,
 }
@@ -121,6 +123,7 @@ impl Life {
             assigned: BTreeSet::new(),
             active: BTreeSet::new(),
             sent: BTreeMap::new(),
+            passed: BTreeMap::new(),
             told: None,
         })
     }

@@ -8,6 +8,7 @@ use aldis_envelope::lmcp::Ref;
 use aldis_envelope::lmcp::cmasi::{AutomationResponse, EntityState, Location3D, MissionCommand, Waypoint};
 use aldis_envelope::lmcp::route::{RouteConstraints, RoutePlanResponse};
 use aldis_envelope::lmcp::uxtask::{TaskActive, TaskComplete};
+use std::collections::BTreeSet;
 
 /// How long a vehicle stays where something that moves was, before its task is complete, in milliseconds.
 const LINGER_MS: i64 = 30_000;
@@ -17,6 +18,29 @@ const THROTTLE_MS: f64 = 3000.0;
 
 /// How far that must have moved, in metres, unless `TargetMovementRecalculateThreshold_m` says otherwise.
 const MOVED_M: f64 = 400.0;
+
+/// What follows a task in the mission of a vehicle.
+pub(super) struct Passed {
+    command: i64,
+    /// The waypoints after the last one of the task.
+    after: BTreeSet<i64>,
+}
+
+impl Passed {
+    fn of(task: i64, mission: &MissionCommand) -> Self {
+        let list: Vec<&Waypoint> = mission.waypoint_list.iter().filter_map(|at| at.get()).collect();
+        let last = list.iter().rposition(|at| at.associated_tasks.contains(&task));
+        let after = last.map_or(&[][..], |last| &list[last + 1..]).iter().map(|at| at.number).collect();
+        Self { command: mission.command_id, after }
+    }
+
+    /// Whether a state is one of a vehicle that has left the task behind it in this mission, as it was sent or as a
+    /// `WaypointPlanManager` serves it.
+    fn is_behind(&self, state: &EntityState) -> bool {
+        let is_same = [state.current_command, state.current_command >> 16].contains(&self.command);
+        is_same && self.after.contains(&state.current_waypoint)
+    }
+}
 
 impl Life {
     /// A request is answered: who is assigned now.
@@ -29,6 +53,7 @@ impl Life {
             self.assigned.remove(&mission.vehicle_id);
             let mut waypoints = mission.waypoint_list.iter().filter_map(|at| at.get());
             if waypoints.any(|at| at.associated_tasks.contains(&self.id)) {
+                self.passed.insert(mission.vehicle_id, Passed::of(self.id, mission));
                 self.assigned.insert(mission.vehicle_id);
                 self.state = State::OptionSelected;
             }
@@ -37,7 +62,18 @@ impl Life {
             self.state.step(Trigger::Dropped);
         }
         self.sent.retain(|vehicle, _| self.assigned.contains(vehicle));
+        self.passed.retain(|vehicle, _| self.assigned.contains(vehicle));
         self.active.retain(|vehicle| self.assigned.contains(vehicle));
+    }
+
+    /// A vehicle does not do its mission any more: where nobody else is assigned, the task is free and not complete.
+    pub fn lost(&mut self, vehicle: i64) {
+        self.sent.remove(&vehicle);
+        self.active.remove(&vehicle);
+        let is_done_with = matches!(self.state, State::OptionSelected | State::Active);
+        if self.assigned.remove(&vehicle) && self.assigned.is_empty() && is_done_with {
+            self.state.step(Trigger::Dropped);
+        }
     }
 
     /// A new request takes the task from who is at it: that is complete.
@@ -54,16 +90,18 @@ impl Life {
             return;
         }
         let is_at_it = state.associated_tasks.contains(&self.id);
+        // Of the states of a vehicle behind a bad link the newest come: a short task may begin and end between two of them.
+        let has_been = self.passed.get(&state.id).is_some_and(|passed| passed.is_behind(state));
+        if (is_at_it || has_been) && self.active.insert(state.id) {
+            self.state.step(Trigger::Taken);
+            let time_task_activated = time_of(state, context);
+            context.post.broadcast(&TaskActive {
+                task_id: self.id,
+                entity_id: state.id,
+                time_task_activated,
+            });
+        }
         if is_at_it {
-            if self.active.insert(state.id) {
-                self.state.step(Trigger::Taken);
-                let time_task_activated = time_of(state, context);
-                context.post.broadcast(&TaskActive {
-                    task_id: self.id,
-                    entity_id: state.id,
-                    time_task_activated,
-                });
-            }
             self.steer(state, context);
         } else if self.active.remove(&state.id) {
             self.sent.remove(&state.id);
@@ -179,4 +217,31 @@ impl Life {
 
 fn time_of(state: &EntityState, context: &Context<'_, '_>) -> i64 {
     if state.time > 0 { state.time } else { context.post.wall_ms() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_task_is_behind_a_vehicle_that_heads_for_what_comes_after_it_in_the_same_mission() {
+        let at = |number: i64, tasks: &[i64]| {
+            Ref::new(Waypoint { number, associated_tasks: tasks.to_vec(), ..Waypoint::default() })
+        };
+        let waypoint_list = vec![at(1, &[]), at(2, &[5]), at(3, &[]), at(4, &[5]), at(5, &[6]), at(6, &[])];
+        let mut mission = MissionCommand::default();
+        (mission.command_id, mission.waypoint_list) = (7, waypoint_list);
+        let passed = Passed::of(5, &mission);
+        let state = |current_command, current_waypoint| EntityState {
+            current_command,
+            current_waypoint,
+            ..EntityState::default()
+        };
+        let behind =
+            |command| (1..=6).filter(|&at| passed.is_behind(&state(command, at))).collect::<Vec<_>>();
+        assert_eq!(behind(7), [5, 6]);
+        assert_eq!(behind(7 << 16 | 3), [5, 6], "served in segments");
+        assert_eq!(behind(8), Vec::<i64>::new(), "another mission has the same numbers");
+        assert_eq!(Passed::of(9, &mission).after.len(), 0);
+    }
 }
