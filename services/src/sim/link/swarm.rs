@@ -228,12 +228,7 @@ impl Run {
         self.crashes += 1;
         self.killed[end] = true;
         self.world.kill(MachineId(end));
-        // What it had handled and not written has not happened: an older command may come before that comes again.
-        let (from, other) = ([1, 400][end], [400, 1][end]);
-        let handled = self.world.handled(MachineId(end));
-        let written =
-            handled.keys().map(|content| command_number(content)).filter(|(sender, _)| *sender == other);
-        self.last.insert(other, written.map(|(_, number)| number).max().unwrap_or(0));
+        let from = [1, 400][end];
         let open =
             self.known.iter_mut().filter(|((sender, _), known)| *sender == from && known.last_word.is_none());
         open.for_each(|(_, known)| known.orphaned = true);
