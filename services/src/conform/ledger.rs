@@ -64,6 +64,10 @@ impl Ledger {
             let count = self.counts.entry(debt.0).or_default();
             count.broken += 1;
             count.first.get_or_insert(Evidence { at, topic, text });
+            if debt.0 == Clause::Answered {
+                // Who answers nothing at all answers no update either: that is one breach.
+                self.forgive(&(Clause::UpdateAnswered, debt.1, debt.2, debt.3));
+            }
         }
         self.topic.replace_range(.., topic);
     }

@@ -137,6 +137,8 @@ fn a_client_puts_and_deletes_as_its_own_entities_alone() {
         vehicle.put(key(400, "end"), "x").wait().unwrap();
         let mut heard = ear.upto(&format!("PUT {}", key(400, "end")));
         heard.retain(|said| !said.ends_with("/ready") && !said.ends_with("/end"));
+        // The router is a node itself and says now and then what it reads.
+        heard.retain(|said| !said.contains("/2/1/"));
         let expected = [key(400, "eid500"), key(100, "own"), key(400, "own")];
         let expected = expected
             .iter()

@@ -117,7 +117,7 @@ impl Process {
             if Instant::now() > until {
                 return Err(failed(format!("{} of {} does not end", self.part.name(), self.entity)));
             }
-            std::thread::sleep(LOOK_EVERY);
+            std::thread::park_timeout(LOOK_EVERY);
         }
         Ok(())
     }
@@ -162,6 +162,7 @@ impl Contention {
             format!("aldis-contention-{}-{}", std::process::id(), bus.rsplit(':').next().unwrap_or(""));
         let directory = Scratch(std::env::temp_dir().join(name));
         let seen: Arc<Mutex<Seen>> = Arc::default();
+        lock(&seen).tells = Some(std::thread::current());
         let shore = shore(&bus, &seen)?;
         let parts = std::iter::once((Part::Arbiter, ARBITER))
             .chain(PROVIDERS.map(|entity| (Part::Provider, entity)))
@@ -243,7 +244,7 @@ impl Contenders {
     fn wait_until_given(&self, wanted: u64) -> Result<(), Failure> {
         let (mut last, mut since) = (self.given(), Instant::now());
         while last < wanted {
-            std::thread::sleep(LOOK_EVERY);
+            std::thread::park_timeout(LOOK_EVERY);
             let given = self.given();
             if given > last {
                 (last, since) = (given, Instant::now());
@@ -265,7 +266,7 @@ impl Contenders {
         let mut is_back = false;
         let mut given_after = None;
         while at.elapsed() < 2 * LEASE && !(is_back && given_after.is_some()) {
-            std::thread::sleep(LOOK_EVERY);
+            std::thread::park_timeout(LOOK_EVERY);
             if given_after.is_none() && self.given() > before {
                 given_after = Some(at.elapsed());
             }
@@ -288,7 +289,7 @@ impl Contenders {
             if left.is_empty() || Instant::now() > until {
                 return Ok(left);
             }
-            std::thread::sleep(LOOK_EVERY);
+            std::thread::park_timeout(LOOK_EVERY);
         }
     }
 }

@@ -185,27 +185,6 @@ impl Session {
         self.last_ack = Some(acknowledged);
     }
 
-    /// An execution status.
-    pub(super) fn execution_status(&mut self, sample: &Sample, retained: bool, ledger: &mut Ledger) {
-        self.execution_status_there = true;
-        // The same sample again, after a restart of who carries it, says nothing of now.
-        if self.last_execution_status.replace(sample.clone()).as_ref() == Some(sample) {
-            return;
-        }
-        self.correlate(retained, "an execution status", ledger);
-        if retained {
-            return;
-        }
-        let executing = self.state.as_deref() == Some("EXECUTING") || self.updates > 0;
-        let state = self.state.clone().unwrap_or_else(|| "not answered".to_owned());
-        if executing {
-            ledger.pay(&self.debt(Clause::ExecutionStatus));
-        }
-        self.judge(Clause::ExecutionStatus, executing, ledger, || {
-            format!("an execution status while {state}")
-        });
-    }
-
     fn correlate(&self, retained: bool, what: &str, ledger: &mut Ledger) {
         if self.command.is_some() {
             ledger.held(Clause::Correlated);
@@ -240,12 +219,6 @@ impl Session {
         self.after(&to, &reason, retained, ledger);
         let (family, session, provider) = self.id.clone();
         Some(Step { family, provider, session, command: self.commanded().cloned(), to, reason, retained })
-    }
-
-    /// The command that a status is about: an update that its provider has not acknowledged is on its way to it.
-    fn commanded(&self) -> Option<&Sample> {
-        let acknowledged = self.last_ack.as_ref().filter(|ack| self.before.contains(ack));
-        acknowledged.or(self.command.as_ref())
     }
 
     fn transition(&self, to: &str, reason: &str, ledger: &mut Ledger) {

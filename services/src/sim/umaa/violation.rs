@@ -68,8 +68,9 @@ impl Finding {
     }
 }
 
-/// A breach may find no occasion in one run, such as a cancel at the right moment: so many seeds are tried.
-const TRIES: u64 = 3;
+/// A breach may find no occasion in one run, such as a cancel at the right moment, or a command that its consumer leaves alone until
+/// an answer is due: so many seeds are tried.
+const TRIES: u64 = 12;
 
 impl Violation {
     /// What the monitor found with the first seed, from this one on, in which it found anything.

@@ -45,6 +45,8 @@ pub(super) struct Seen {
     orders: BTreeMap<SessionKey, Session>,
     watcher: Option<Watcher>,
     now: Option<Monotonic>,
+    /// Woken with each message: it waits for what it sees.
+    pub(super) tells: Option<std::thread::Thread>,
 }
 
 impl Seen {
@@ -157,6 +159,7 @@ impl Service for Watch {
             && envelope.message.call.is_none()
         {
             seen.message(envelope);
+            seen.tells.iter().for_each(std::thread::Thread::unpark);
         }
         let Some(watcher) = &mut seen.watcher else { return };
         match input {

@@ -6,6 +6,38 @@ use crate::conform::ledger::Ledger;
 use crate::conform::sample::Sample;
 
 impl Session {
+    /// An execution status.
+    pub(in crate::conform::command) fn execution_status(
+        &mut self,
+        sample: &Sample,
+        retained: bool,
+        ledger: &mut Ledger,
+    ) {
+        self.execution_status_there = true;
+        // The same sample again, after a restart of who carries it, says nothing of now.
+        if self.last_execution_status.replace(sample.clone()).as_ref() == Some(sample) {
+            return;
+        }
+        self.correlate(retained, "an execution status", ledger);
+        if retained {
+            return;
+        }
+        let executing = self.state.as_deref() == Some("EXECUTING") || self.updates > 0;
+        let state = self.state.clone().unwrap_or_else(|| "not answered".to_owned());
+        if executing {
+            ledger.pay(&self.debt(Clause::ExecutionStatus));
+        }
+        self.judge(Clause::ExecutionStatus, executing, ledger, || {
+            format!("an execution status while {state}")
+        });
+    }
+
+    /// The command that a status is about: an update that its provider has not acknowledged is on its way to it.
+    pub(super) fn commanded(&self) -> Option<&Sample> {
+        let acknowledged = self.last_ack.as_ref().filter(|ack| self.before.contains(ack));
+        acknowledged.or(self.command.as_ref())
+    }
+
     /// Judges what a command that the consumer has written already may excuse as soon as it comes.
     pub(super) fn judge_crossing(
         &self,
