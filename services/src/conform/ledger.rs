@@ -107,6 +107,10 @@ impl Ledger {
         }
     }
 
+    pub(super) fn is_owed(&self, debt: &Debt) -> bool {
+        self.owed.contains_key(debt)
+    }
+
     /// What was owed has come.
     pub(super) fn pay(&mut self, debt: &Debt) {
         if self.forgive(debt) {

@@ -224,5 +224,5 @@ fn write(
     }
     pending.push_back(change);
     let waiting = port.waiting.fetch_add(1, Ordering::Relaxed) + 1;
-    Ok((waiting % TELL_EVERY == 0).then_some(DomainEvent::Waiting(waiting)))
+    Ok((waiting.is_multiple_of(TELL_EVERY)).then_some(DomainEvent::Waiting(waiting)))
 }

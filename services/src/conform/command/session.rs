@@ -22,6 +22,8 @@ pub(super) struct Session {
     command: Option<Sample>,
     /// The command before its latest updates: acknowledgements may have crossed them.
     before: VecDeque<Sample>,
+    /// The command was on the bus before the monitor was.
+    was_there: bool,
     /// The consumer has disposed the command.
     disposed: bool,
     /// How many updates are on the bus that have not been answered.
@@ -52,6 +54,7 @@ impl Session {
             has_execution_status,
             command: None,
             before: VecDeque::new(),
+            was_there: false,
             disposed: false,
             updates: 0,
             state: None,
@@ -137,7 +140,7 @@ impl Session {
         if ledger.forgive(&self.debt(Clause::UpdatedOnly)) {
             // Its answer was here sooner.
             ledger.held(Clause::UpdatedOnly);
-        } else if self.ended.is_none() {
+        } else if self.ended.is_none() && self.may_be_answered(ledger) {
             self.updates += 1;
             self.owe(Clause::UpdateAnswered, ledger, "its update is not answered");
         }
@@ -159,6 +162,7 @@ impl Session {
         if !self.acknowledged {
             self.comes_after_its_ack(sample, ledger);
         }
+        self.was_there = retained;
         if self.state.is_none() && !retained {
             self.owe(Clause::Answered, ledger, "its command is not answered");
         }

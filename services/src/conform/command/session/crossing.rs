@@ -6,6 +6,11 @@ use crate::conform::ledger::Ledger;
 use crate::conform::sample::Sample;
 
 impl Session {
+    /// Whether somebody answers this command at all: where it has been told that nobody does, updates are not told too.
+    pub(super) fn may_be_answered(&self, ledger: &Ledger) -> bool {
+        self.state.is_some() || self.was_there || ledger.is_owed(&self.debt(Clause::Answered))
+    }
+
     /// An execution status.
     pub(in crate::conform::command) fn execution_status(
         &mut self,
