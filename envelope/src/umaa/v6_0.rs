@@ -1,5 +1,5 @@
-//! Support Operations in version 6.0: what differs from 5.2.1 (umaa-so, Version 6.0). Described, and translated by
-//! [`crate::umaa::Version`]'s users; the nodes speak 5.2.1 among themselves.
+//! Support Operations in version 6.0: what differs from 5.2.1 (umaa-so, Version 6.0). Described here, and
+//! translated where a bridge meets it; the nodes speak 5.2.1 among themselves.
 
 use super::structure::{Described, Members};
 use super::{LargeSetMetadata, v5_2_1};
