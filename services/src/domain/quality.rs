@@ -1,6 +1,7 @@
 //! The quality of service of a bridge's own endpoints (umaa-so, Quality of service; dds, What bites 6).
 
 use super::config::DomainConfig;
+use crate::dds::Pattern;
 use crate::service::domain::{Durable, Endpoint, Quality, Xcdr};
 
 /// How many samples of an instance a writer keeps where all are wanted: what kits of UMAA vendors take.
@@ -8,7 +9,7 @@ const KEPT_MAX: u32 = 500;
 
 /// What the patterns of UMAA and the configuration say of a topic.
 fn of_topic(config: &DomainConfig, topic: &str) -> Quality {
-    let name = topic.strip_suffix("Type").unwrap_or(topic);
+    let pattern = Pattern::of(topic);
     let mut quality = Quality {
         reliable: true,
         durable: Durable::TransientLocal,
@@ -23,10 +24,10 @@ fn of_topic(config: &DomainConfig, topic: &str) -> Quality {
         autodispose: false,
         xcdr: Vec::new(),
     };
-    if ["CommandStatus", "LogReport", "SetElement", "ListElement"].iter().any(|end| name.ends_with(end)) {
+    if matches!(pattern, Some(Pattern::Status | Pattern::Log | Pattern::Element)) {
         quality.keep_last = None;
     }
-    if name.ends_with("LogReport") {
+    if pattern == Some(Pattern::Log) {
         quality.durable = Durable::Volatile;
     }
     if let Some(rule) = config.rules.iter().find(|rule| rule.topics.matches(topic)) {
