@@ -30,7 +30,7 @@ fn ping() -> Result<Envelope, Box<dyn Error>> {
         lifespan_left_ms: None,
         priority: Priority::Data,
         skipped: 0,
-        via: Vec::new(),
+        via: Default::default(),
     };
     Ok(Envelope { message, stamp })
 }

@@ -29,5 +29,5 @@ pub use key::{Fleet, Keys, Space};
 pub use message::{Attributes, Envelope, Label, Message};
 pub use name::{ContentType, Descriptor, Group, Name, NameError};
 pub use prefix::Prefix;
-pub use stamp::{Priority, Stamp};
+pub use stamp::{Priority, Stamp, Via};
 pub use time::{DateTime, Monotonic, Now, Wall};

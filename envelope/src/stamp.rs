@@ -3,6 +3,7 @@
 use crate::id::{BootId, EntityId};
 use crate::time::Wall;
 use serde::{Deserialize, Serialize};
+use std::ops::Deref;
 
 /// How urgent a stream is; the levels and their order are Zenoh's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
@@ -55,6 +56,34 @@ impl From<Priority> for u8 {
 /// The most nodes that a message may have passed: a longer way is a loop, or hostile.
 pub const VIA_MAX: usize = 16;
 
+/// The nodes that a message passed after the one that stamped it, at most [`VIA_MAX`].
+///
+/// It is as small as a pointer, because nearly every message passes none and an envelope is moved often.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[allow(clippy::box_collection, reason = "a vector itself would be three times as large in every envelope")]
+pub struct Via(Option<Box<Vec<EntityId>>>);
+
+impl Via {
+    /// The message has passed one more node.
+    pub fn push(&mut self, node: EntityId) {
+        self.0.get_or_insert_default().push(node);
+    }
+}
+
+impl Deref for Via {
+    type Target = [EntityId];
+    fn deref(&self) -> &[EntityId] {
+        self.0.as_ref().map_or(&[], |nodes| nodes.as_slice())
+    }
+}
+
+impl FromIterator<EntityId> for Via {
+    fn from_iter<I: IntoIterator<Item = EntityId>>(nodes: I) -> Self {
+        let nodes: Vec<_> = nodes.into_iter().collect();
+        Self((!nodes.is_empty()).then(|| Box::new(nodes)))
+    }
+}
+
 /// What the stamping node says of a message.
 ///
 /// A **stream** is (stamping node, source, boot id, address): its `sequence` counts from 1 without holes.
@@ -75,5 +104,5 @@ pub struct Stamp {
     /// How many samples just before this one were left out by a rule: told, and so not lost.
     pub skipped: u32,
     /// The nodes that the message passed after the one that stamped it, at most [`VIA_MAX`].
-    pub via: Vec<EntityId>,
+    pub via: Via,
 }

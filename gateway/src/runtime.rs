@@ -141,11 +141,11 @@ async fn drive(
     tasks.shutdown().await;
 }
 
-/// The way of an event to an idle node, on the thread that has it.
+/// The way of a sample to an idle node, on the thread that has it.
 fn direct(core: Shared) -> crate::bus::Direct {
-    Box::new(move |event| match core.try_lock() {
-        Some(mut core) => core.handle_on_callback(event),
-        None => Some(event),
+    Box::new(move |envelope| match core.try_lock() {
+        Some(mut core) => core.sample_on_callback(envelope),
+        None => Some(envelope),
     })
 }
 

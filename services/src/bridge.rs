@@ -101,6 +101,8 @@ pub(crate) struct Bridge {
     pub(crate) state: String,
     importer: Importer,
     peers: BTreeMap<PeerId, Peer>,
+    /// Those of the peers that take messages, in their order.
+    takers: Vec<PeerId>,
 }
 
 impl Bridge {
@@ -108,7 +110,8 @@ impl Bridge {
         let importer = Importer::new(spec.source, entities.to_vec(), spec.import.clone());
         let importer = if spec.self_generated { importer.self_generated() } else { importer };
         let state = "starting".to_owned();
-        Self { spec, counters: BridgeCounters::default(), state, importer, peers: BTreeMap::new() }
+        let (counters, peers) = (BridgeCounters::default(), BTreeMap::new());
+        Self { spec, counters, state, importer, peers, takers: Vec::new() }
     }
 
     /// Whether messages with this label leave here: UxAS reads nothing but `lmcp`.
@@ -120,16 +123,19 @@ impl Bridge {
     pub(crate) fn peer_up(&mut self, peer: PeerId, name: String, credit: usize) {
         self.counters.peers_seen += 1;
         self.peers.insert(peer, Peer { name, credit, ..Peer::default() });
+        self.see_takers();
     }
 
     /// A peer that takes nothing.
     pub(crate) fn giver_up(&mut self, peer: PeerId, name: String) {
         self.counters.peers_seen += 1;
         self.peers.insert(peer, Peer { name, gives_alone: true, ..Peer::default() });
+        self.see_takers();
     }
 
     pub(crate) fn peer_down(&mut self, peer: PeerId) -> Option<String> {
         let gone = self.peers.remove(&peer)?;
+        self.see_takers();
         self.counters.shed_stalled += gone.queue.len() as u64;
         Some(gone.name)
     }
@@ -138,9 +144,13 @@ impl Bridge {
         self.peers.get(&peer).map_or("a former peer", |peer| &peer.name)
     }
 
-    /// Those that take messages.
-    pub(crate) fn takers(&self) -> Vec<PeerId> {
-        self.peers.iter().filter(|(_, peer)| !peer.gives_alone).map(|(&id, _)| id).collect()
+    /// One after the other of those that take messages.
+    pub(crate) fn taker(&self, place: usize) -> Option<PeerId> {
+        self.takers.get(place).copied()
+    }
+
+    fn see_takers(&mut self) {
+        self.takers = self.peers.iter().filter(|(_, peer)| !peer.gives_alone).map(|(&id, _)| id).collect();
     }
 
     /// Whether both lead to one peer.

@@ -153,7 +153,7 @@ pub enum Effect {
     /// Put an envelope with a prepared publisher; a dispose as a DELETE.
     Publish(PublisherId, Envelope),
     /// Put an envelope on a key that is used too rarely for a publisher.
-    PublishOn(String, Envelope),
+    PublishOn(String, Box<Envelope>),
     /// Show (true) or withdraw the token of a service.
     Token(Source, bool),
     /// Write a message to a peer.

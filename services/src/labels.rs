@@ -36,6 +36,8 @@ pub(crate) struct Entry {
     pub(crate) outgoing: Option<usize>,
     /// Its place among the incoming streams of a node, once it was heard.
     pub(crate) incoming: Option<(EntityId, Option<usize>)>,
+    /// The publisher of what has no instance, once there is one.
+    pub(crate) publisher: Option<PublisherId>,
     /// What is known of the keys of its instances.
     pub(crate) publishers: BTreeMap<Option<KeyHash>, Standing>,
 }

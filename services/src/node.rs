@@ -25,8 +25,8 @@ use crate::registry;
 use crate::service::{Action, Component, ComponentHealth, Condition, Input, Level, ServiceSpec};
 use crate::streams::{Inbound, Outbound};
 use aldis_envelope::{
-    Address, BootId, EntityId, Fleet, KeyHash, Keys, Label, Message, Monotonic, Now, Prefix, Priority,
-    ServiceId, Space, Wall,
+    Address, BootId, EntityId, Envelope, Fleet, KeyHash, Keys, Label, Message, Monotonic, Now, Prefix,
+    Priority, ServiceId, Space, Via, Wall,
 };
 use journaling::Journaling;
 use keeping::Keeping;
@@ -82,7 +82,7 @@ struct Passed {
     source_time: Wall,
     lifespan_left_ms: Option<u32>,
     priority: Priority,
-    via: Vec<EntityId>,
+    via: Via,
 }
 
 /// A message that waits inside the node.
@@ -136,6 +136,9 @@ pub struct Node {
     bus_is_open: bool,
     input_is_paused: bool,
     armed: Option<Monotonic>,
+    /// Whether this turn may have left more to do than its effects: a sample that a service took without a word has not, and nearly
+    /// all that comes is of this kind.
+    stirred: bool,
     started: Option<Monotonic>,
     ending: bool,
 }
@@ -186,6 +189,7 @@ impl Node {
             bus_is_open: false,
             input_is_paused: false,
             armed: None,
+            stirred: true,
             started: None,
             ending: false,
         })
@@ -210,16 +214,44 @@ impl Node {
             }
         }
         if self.journaling.is_opening() {
+            self.stirred = true;
             self.before_start(now, events, effects);
         }
         for event in events.drain(..) {
+            self.stirred |= !matches!(event, Event::Sample(_));
             self.event(now, event, effects);
-            self.settle(now, effects);
-            if self.keeping.has_much() {
-                // What came of this event is written as one, and not with what more comes in this turn.
-                self.run_links(now, effects);
-                self.keeping.close();
-            }
+            self.end_event(now, effects);
+        }
+        self.end_turn(now, effects);
+    }
+
+    /// Handles one sample from the bus, as [`Event::Sample`] would be: what comes on the hottest path is not moved once more.
+    pub fn handle_sample(&mut self, now: Now, envelope: &Envelope, effects: &mut Vec<Effect>) {
+        if self.started.is_none() || self.journaling.is_opening() {
+            return self.handle(now, &mut vec![Event::Sample(envelope.clone())], effects);
+        }
+        self.sample(now, envelope, effects);
+        self.end_event(now, effects);
+        self.end_turn(now, effects);
+    }
+
+    /// Does what came of an event.
+    fn end_event(&mut self, now: Now, effects: &mut Vec<Effect>) {
+        if !self.stirred {
+            return;
+        }
+        self.settle(now, effects);
+        if self.keeping.has_much() {
+            // What came of this event is written as one, and not with what more comes in this turn.
+            self.run_links(now, effects);
+            self.keeping.close();
+        }
+    }
+
+    /// Does what waits for the end of a turn.
+    fn end_turn(&mut self, now: Now, effects: &mut Vec<Effect>) {
+        if !self.stirred {
+            return;
         }
         self.run_links(now, effects);
         self.finish_sharing(now, effects);
@@ -227,6 +259,7 @@ impl Node {
         self.append(effects);
         self.update_pause(effects);
         self.arm(effects);
+        self.stirred = false;
     }
 
     fn event(&mut self, now: Now, event: Event, effects: &mut Vec<Effect>) {

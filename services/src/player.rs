@@ -166,7 +166,7 @@ mod tests {
             lifespan_left_ms: None,
             priority: Priority::Data,
             skipped: 0,
-            via: Vec::new(),
+            via: Default::default(),
         };
         Envelope { message: Message::new(Arc::new(label), Bytes::from_static(b"x")), stamp }
     }

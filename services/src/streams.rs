@@ -129,7 +129,7 @@ mod tests {
             lifespan_left_ms: None,
             priority: Priority::Data,
             skipped,
-            via: Vec::new(),
+            via: Default::default(),
         }
     }
 

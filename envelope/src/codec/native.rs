@@ -102,6 +102,9 @@ pub fn encode_constant(label: &Label, node: EntityId, boot: BootId, priority: Pr
 pub fn encode_variable(message: &Message, stamp: &Stamp, out: &mut Vec<u8>) {
     put_varint(stamp.sequence, out);
     put_varint(zigzag(stamp.source_time.0), out);
+    if says_no_more(message, stamp) {
+        return out.extend_from_slice(&NO_MORE);
+    }
     match stamp.lifespan_left_ms {
         None => out.push(0),
         Some(milliseconds) => {
@@ -111,7 +114,7 @@ pub fn encode_variable(message: &Message, stamp: &Stamp, out: &mut Vec<u8>) {
     }
     put_varint(u64::from(stamp.skipped), out);
     put_varint(stamp.via.len() as u64, out);
-    for node in &stamp.via {
+    for node in stamp.via.iter() {
         put_varint(node.get(), out);
     }
     out.push(match message.change {
@@ -136,6 +139,19 @@ pub fn encode_variable(message: &Message, stamp: &Stamp, out: &mut Vec<u8>) {
     }
 }
 
+/// What follows the source time of a put that is part of no call, was passed on by nobody and follows its predecessor: nearly all.
+const NO_MORE: [u8; 6] = [0; 6];
+
+fn says_no_more(message: &Message, stamp: &Stamp) -> bool {
+    let Message { label, change, instance, call, .. } = message;
+    *change == Change::Put
+        && call.is_none()
+        && stamp.lifespan_left_ms.is_none()
+        && stamp.skipped == 0
+        && stamp.via.is_empty()
+        && (instance.is_none() || label.is_broadcast())
+}
+
 /// The serialized key travels where the receiver has neither the content nor the hash in the key to take it from.
 fn key_on_the_wire(message: &Message) -> Option<&[u8]> {
     let spoken_by_content = message.change == Change::Put && message.label.is_broadcast();
@@ -156,11 +172,14 @@ fn put_text(text: &str, out: &mut Vec<u8>) {
 }
 
 fn put_varint(mut number: u64, out: &mut Vec<u8>) {
+    let (mut bytes, mut count) = ([0; 10], 0);
     while number >= 0x80 {
-        out.push(number as u8 | 0x80);
+        bytes[count] = number as u8 | 0x80;
         number >>= 7;
+        count += 1;
     }
-    out.push(number as u8);
+    bytes[count] = number as u8;
+    out.extend_from_slice(&bytes[..=count]);
 }
 
 fn zigzag(number: i64) -> u64 {

@@ -28,6 +28,19 @@ pub fn checksum(bytes: &[u8]) -> u32 {
     bytes.iter().fold(0, |sum, &byte| sum.wrapping_add(u32::from(byte)))
 }
 
+/// Appends a number as decimal text: each frame has two, and formatting costs more than the rest of the frame.
+fn put_decimal(mut number: u64, out: &mut Vec<u8>) {
+    let (mut digits, mut from) = ([0; 20], 20);
+    loop {
+        from -= 1;
+        digits[from] = b'0' + (number % 10) as u8;
+        number /= 10;
+        if number == 0 {
+            return out.extend_from_slice(&digits[from..]);
+        }
+    }
+}
+
 /// How damage of a frame is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Check {
@@ -75,18 +88,18 @@ impl Writer {
         let sum = self.head_sum.wrapping_add(checksum(payload));
         out.reserve(self.head.len() + payload.len() + 52);
         out.extend_from_slice(HEAD);
-        // Writing to a Vec cannot fail.
-        let _ = write!(out, "{}", self.head.len() + payload.len());
+        put_decimal((self.head.len() + payload.len()) as u64, out);
         out.extend_from_slice(SIZE_END);
         out.extend_from_slice(&self.head);
         out.extend_from_slice(payload);
         out.extend_from_slice(BODY_END);
-        let _ = write!(out, "{sum}");
+        put_decimal(u64::from(sum), out);
         out.extend_from_slice(TAIL);
         if self.check == Check::Crc {
             let mut crc = crc32fast::Hasher::new();
             crc.update(&self.head);
             crc.update(payload);
+            // Writing to a Vec cannot fail.
             let _ = write!(out, "{:08x}", crc.finalize());
         }
     }

@@ -1,7 +1,7 @@
 //! What Zenoh's threads hand to the node: straight, while it is idle; else by a bounded queue that says what it sheds.
 
-use aldis_envelope::Keys;
 use aldis_envelope::codec::native::Decoder;
+use aldis_envelope::{Envelope, Keys};
 use aldis_services::Event;
 use bytes::Bytes;
 use std::collections::VecDeque;
@@ -25,8 +25,8 @@ const LEARNING_MAX: usize = 4_096;
 /// the five seconds after which Zenoh gives up a transport.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Hands an event to the node on Zenoh's thread, where the node is idle; else gives it back.
-pub(crate) type Direct = Box<dyn Fn(Event) -> Option<Event> + Send + Sync>;
+/// Hands an envelope to the node on Zenoh's thread, where the node is idle; else gives it back.
+pub(crate) type Direct = Box<dyn Fn(Envelope) -> Option<Envelope> + Send + Sync>;
 
 /// Events on their way to the node.
 pub(crate) struct Inbox {
@@ -63,22 +63,22 @@ impl Inbox {
             state.shed += 1;
             return;
         }
-        let event = match state.decoder.decode(key, deleted, header, content) {
-            Ok(envelope) => Event::Sample(envelope),
-            Err(why) => Event::SampleRefused(why),
+        let envelope = match state.decoder.decode(key, deleted, header, content) {
+            Ok(envelope) => envelope,
+            Err(why) => return self.push(state, Event::SampleRefused(why)),
         };
         if state.decoder.take_learned() && state.learned.len() < LEARNING_MAX {
             state.learned.push(key.to_owned());
         } else if state.events.is_empty() {
-            // What waits goes first, and Zenoh hands over the samples of one stream one after the other: so an event that
+            // What waits goes first, and Zenoh hands over the samples of one stream one after the other: so one that
             // finds nothing waiting may pass.
             drop(state);
-            if let Some(event) = (self.direct)(event) {
-                self.event(event);
+            if let Some(envelope) = (self.direct)(envelope) {
+                self.event(Event::Sample(envelope));
             }
             return;
         }
-        self.push(state, event);
+        self.push(state, Event::Sample(envelope));
     }
 
     /// Takes any other event.

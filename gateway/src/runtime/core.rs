@@ -7,7 +7,7 @@ use crate::bus::{Bus, BusError};
 use crate::carrier::Carriers;
 use crate::clock::Clock;
 use crate::journal::JournalThread;
-use aldis_envelope::Monotonic;
+use aldis_envelope::{Envelope, Monotonic};
 use aldis_services::service::{Job, Level, Note};
 use aldis_services::{Effect, Event, Node};
 use std::collections::VecDeque;
@@ -106,6 +106,8 @@ pub(crate) struct Core {
     runtime: tokio::runtime::Handle,
     timer: watch::Sender<Option<Monotonic>>,
     paused: watch::Sender<bool>,
+    /// What was said last on `paused`: each message on a callback asks.
+    is_paused: bool,
     exited: watch::Sender<bool>,
     jobs: mpsc::UnboundedSender<Event>,
 }
@@ -142,6 +144,7 @@ impl Core {
             runtime,
             timer,
             paused,
+            is_paused: false,
             exited,
             jobs,
         };
@@ -195,9 +198,28 @@ impl Core {
         self.work(events, On::Loop);
     }
 
-    /// Hands an event to the node on Zenoh's thread; gives it back while input is paused.
-    pub(super) fn handle_on_callback(&mut self, event: Event) -> Option<Event> {
-        if *self.paused.borrow() {
+    /// Hands a sample to the node on Zenoh's thread; gives it back while input is paused.
+    pub(super) fn sample_on_callback(&mut self, envelope: Envelope) -> Option<Envelope> {
+        if self.is_paused {
+            return Some(envelope);
+        }
+        let now = self.clock.now();
+        self.node.handle_sample(now, &envelope, &mut self.effects);
+        if !self.effects.is_empty() {
+            let mut events = std::mem::take(&mut self.events);
+            self.carry_out_all(now.monotonic, On::Callback, &mut events);
+            if !events.is_empty() {
+                self.work(&mut events, On::Callback);
+            }
+            self.events = events;
+        }
+        None
+    }
+
+    /// Hands an event to the node on the thread of a domain; gives it back while input is paused.
+    #[cfg(feature = "dds")]
+    fn handle_on_callback(&mut self, event: Event) -> Option<Event> {
+        if self.is_paused {
             return Some(event);
         }
         let mut events = std::mem::take(&mut self.events);
@@ -210,24 +232,31 @@ impl Core {
     fn work(&mut self, events: &mut Vec<Event>, on: On) {
         loop {
             let now = self.clock.now();
-            let mut effects = std::mem::take(&mut self.effects);
-            self.node.handle(now, events, &mut effects);
-            self.allow_puts(now.monotonic);
-            for effect in effects.drain(..) {
-                self.carry_out(now.monotonic, effect, on, events);
-            }
-            self.effects = effects;
-            if on == On::Callback && self.has_output() && !self.is_quiet(now.monotonic) {
-                self.wake.notify_one();
-            } else if self.has_output() {
-                self.last_out = Some(now.monotonic);
-                self.peers.flush(events);
-                #[cfg(feature = "dds")]
-                self.domains.flush();
+            self.node.handle(now, events, &mut self.effects);
+            if !self.effects.is_empty() || self.has_output() {
+                self.carry_out_all(now.monotonic, on, events);
             }
             if events.is_empty() {
                 return;
             }
+        }
+    }
+
+    /// Carries out what the node wants; what comes of that is in the events.
+    fn carry_out_all(&mut self, now: Monotonic, on: On, events: &mut Vec<Event>) {
+        self.allow_puts(now);
+        let mut effects = std::mem::take(&mut self.effects);
+        for effect in effects.drain(..) {
+            self.carry_out(now, effect, on, events);
+        }
+        self.effects = effects;
+        if on == On::Callback && self.has_output() && !self.is_quiet(now) {
+            self.wake.notify_one();
+        } else if self.has_output() {
+            self.last_out = Some(now);
+            self.peers.flush(events);
+            #[cfg(feature = "dds")]
+            self.domains.flush();
         }
     }
 
@@ -249,6 +278,7 @@ impl Core {
                 self.timer.send_replace(Some(at));
             }
             Effect::PauseInput(paused) => {
+                self.is_paused = paused;
                 self.paused.send_replace(paused);
             }
             Effect::Append(_, batch) => {
@@ -329,7 +359,7 @@ impl Core {
 fn carry_out_on_bus(bus: &mut Bus, effect: Effect) -> Result<(), BusError> {
     match effect {
         Effect::Publish(publisher, envelope) => bus.publish(publisher, envelope),
-        Effect::PublishOn(key, envelope) => bus.publish_on(key, envelope),
+        Effect::PublishOn(key, envelope) => bus.publish_on(key, *envelope),
         Effect::Subscribe(expressions) => bus.subscribe(expressions),
         Effect::Declare { publisher, key, constant, priority } => {
             bus.declare(publisher, key, constant, priority)

@@ -33,7 +33,7 @@ fn envelopes_are_read_as_observations() {
         lifespan_left_ms: None,
         priority: Priority::Data,
         skipped: 0,
-        via: Vec::new(),
+        via: Default::default(),
     };
     let envelope = |message| Envelope { message, stamp: stamp.clone() };
     let decoder = Decoder::new([]);

@@ -231,7 +231,7 @@ mod tests {
             lifespan_left_ms: None,
             priority: Priority::Data,
             skipped: 0,
-            via: Vec::new(),
+            via: Default::default(),
         };
         Envelope { message: Message { change, ..message }, stamp }
     }

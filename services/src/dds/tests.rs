@@ -89,7 +89,7 @@ impl Pair {
             lifespan_left_ms: None,
             priority: Priority::Data,
             skipped: 0,
-            via: Vec::new(),
+            via: Default::default(),
         };
         let envelope = Envelope { message: Message { change, ..message }, stamp };
         self.writers.wrote(self.now, self.qos, true, &envelope);

@@ -144,7 +144,7 @@ fn from_fleet(of: Source, change: Change, key: i32, content: Bytes, at: i64) -> 
         lifespan_left_ms: None,
         priority: Priority::Data,
         skipped: 0,
-        via: Vec::new(),
+        via: Default::default(),
     };
     Envelope { message, stamp }
 }

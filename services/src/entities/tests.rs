@@ -23,7 +23,7 @@ fn envelope(message: Message, sent_ms: i64) -> Envelope {
         lifespan_left_ms: None,
         priority: Priority::Data,
         skipped: 0,
-        via: Vec::new(),
+        via: Default::default(),
     };
     Envelope { message, stamp }
 }

@@ -1,7 +1,7 @@
 //! A message as it travels in a frame: its label, its origin and all that differs from message to message.
 
 use super::wire::{Malformed, Reader, put_run, put_varint, put_zigzag};
-use aldis_envelope::stamp::VIA_MAX;
+use aldis_envelope::stamp::{VIA_MAX, Via};
 use aldis_envelope::{
     Address, Attributes, BootId, Change, ContentType, Descriptor, EntityId, Envelope, Group, Instance,
     KeyHash, KeyWidth, Label, Message, Name, Priority, ServiceId, Source, Stamp, Wall,
@@ -23,7 +23,7 @@ pub(super) struct LabelEntry {
 pub(super) struct Origin {
     pub(super) node: EntityId,
     pub(super) boot: BootId,
-    pub(super) via: Vec<EntityId>,
+    pub(super) via: Via,
 }
 
 /// Source times travel in whole microseconds.
@@ -79,7 +79,7 @@ impl Origin {
         put_varint(self.node.get(), out);
         put_varint(self.boot.0, out);
         put_varint(self.via.len() as u64, out);
-        for node in &self.via {
+        for node in self.via.iter() {
             put_varint(node.get(), out);
         }
     }

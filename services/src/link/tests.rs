@@ -283,7 +283,7 @@ fn what_cannot_be_in_time_is_refused_with_the_estimate() {
         a.tickets
     );
     let mut back = envelope(2, b"");
-    back.stamp.via = vec![entity(7), entity(1)];
+    back.stamp.via = [entity(7), entity(1)].into_iter().collect();
     a.offer(1_000, 2, back, Class::Command);
     assert_eq!(a.tickets[1], (Ticket(2), TicketState::Refused(Reason::Loop)));
 }

@@ -51,7 +51,7 @@ impl Node {
                 lifespan_left_ms: None,
                 priority: Priority::Data,
                 skipped,
-                via: Vec::new(),
+                via: Default::default(),
             },
             Some(passed) => {
                 let Passed { delivery, source_time, lifespan_left_ms, priority, via } = *passed;
@@ -101,6 +101,7 @@ impl Node {
         let place = self.label(&envelope.message.label);
         let entry = self.labels.entry(place);
         if entry.among_nodes {
+            self.stirred = true;
             self.told_by_node(now, envelope, effects);
             return;
         }
@@ -109,6 +110,7 @@ impl Node {
         }
         if let Some(qos) = entry.qos.filter(|_| !entry.services.is_empty() || !entry.links.is_empty()) {
             let mut step = Step::default();
+            self.stirred = true;
             self.sharing.reading.sample(now.monotonic, qos, envelope, &mut step);
             self.take_step(now, step, effects);
             return;
@@ -180,8 +182,13 @@ impl Node {
                 self.counters.delivered += 1;
                 self.run(now, service, Input::Message(envelope), effects);
             }
-            Some(Call { role: Role::Request { .. }, .. }) => self.request(now, service, envelope, effects),
-            Some(call) => self.answer(now, service, envelope, call, effects),
+            Some(call) => {
+                self.stirred = true;
+                match call.role {
+                    Role::Request { .. } => self.request(now, service, envelope, effects),
+                    _ => self.answer(now, service, envelope, call, effects),
+                }
+            }
         }
     }
 
@@ -258,7 +265,8 @@ impl Node {
         {
             return;
         }
-        for peer in self.bridges[bridge.0].takers() {
+        for i in 0.. {
+            let Some(peer) = self.bridges[bridge.0].taker(i) else { return };
             if origin != Origin::Peer(bridge, peer) {
                 self.send_to_peer(now, bridge, peer, &message.label, &message.content, effects);
             }
@@ -277,7 +285,7 @@ impl Node {
         use crate::bridge::Sent;
         match self.bridges[bridge.0].send(now.monotonic, peer, label, content) {
             Sent::Now => effects.push(Effect::Send(bridge, peer, label.clone(), content.clone())),
-            Sent::Later => {}
+            Sent::Later => self.stirred = true,
             Sent::Shed => {
                 let name = &self.bridges[bridge.0].spec.name;
                 let text =
@@ -334,6 +342,7 @@ impl Node {
             among_nodes: sharing::is_among_nodes(label),
             outgoing: None,
             incoming: None,
+            publisher: None,
             publishers: Default::default(),
         })
     }

@@ -236,7 +236,7 @@ impl Node {
             lifespan_left_ms: None,
             priority: Priority::Data,
             skipped,
-            via: Vec::new(),
+            via: Default::default(),
         };
         let envelope = Envelope { message, stamp };
         self.counters.shed_retained += self.sharing.writers.wrote(now.monotonic, qos, publish, &envelope);

@@ -214,6 +214,7 @@ impl Node {
         envelope: &Envelope,
         effects: &mut Vec<Effect>,
     ) {
+        self.stirred = true;
         self.links.destinations.hear(&envelope.message);
         if origin == Origin::Link(id) {
             return;

@@ -16,6 +16,11 @@ const INSTANCE_PUBLISHERS_MAX: usize = 64;
 impl Node {
     pub(super) fn publish(&mut self, place: usize, envelope: Envelope, effects: &mut Vec<Effect>) {
         self.counters.published += 1;
+        if envelope.message.instance.is_none()
+            && let Some(publisher) = self.labels.entry(place).publisher
+        {
+            return effects.push(Effect::Publish(publisher, envelope));
+        }
         let message = &envelope.message;
         let (label, change) = (message.label.clone(), message.change);
         let instance = message.instance.clone();
@@ -33,7 +38,7 @@ impl Node {
             None => {
                 let space = if on_a_writer_key { Space::Writer } else { Space::Data };
                 let key = self.keys.envelope(space, &label, instance.as_deref());
-                effects.push(Effect::PublishOn(key, envelope));
+                effects.push(Effect::PublishOn(key, Box::new(envelope)));
             }
         }
     }
@@ -73,7 +78,11 @@ impl Node {
                 next
             }
         };
-        self.labels.entry(place).publishers.insert(instance, Standing::Declared(publisher));
+        let entry = self.labels.entry(place);
+        if instance.is_none() {
+            entry.publisher = Some(publisher);
+        }
+        entry.publishers.insert(instance, Standing::Declared(publisher));
         Some(publisher)
     }
 }

@@ -15,7 +15,13 @@ fn work(place: usize, message: Message) -> Work {
 
 /// What the stamp says of a message that was said elsewhere.
 fn said_at(source_time: Wall) -> Passed {
-    Passed { source_time, lifespan_left_ms: None, priority: Priority::Data, via: Vec::new(), delivery: None }
+    Passed {
+        source_time,
+        lifespan_left_ms: None,
+        priority: Priority::Data,
+        via: Default::default(),
+        delivery: None,
+    }
 }
 
 impl Node {
@@ -42,11 +48,18 @@ impl Node {
 
     /// Gives a service an input and looks after what comes of it.
     pub(super) fn run(&mut self, now: Now, place: usize, input: Input<'_>, effects: &mut Vec<Effect>) {
-        let ran = self.services[place].run(now, input);
-        if self.awake.back() != Some(&place) {
-            self.awake.push_back(place);
+        let hosted = &mut self.services[place];
+        let deadline = hosted.next_deadline();
+        let ran = hosted.run(now, input);
+        self.stirred |= hosted.next_deadline() != deadline;
+        if hosted.has_actions() {
+            self.stirred = true;
+            if self.awake.back() != Some(&place) {
+                self.awake.push_back(place);
+            }
         }
         if ran != Ran::Well {
+            self.stirred = true;
             self.after(now, place, ran, effects);
         }
     }
@@ -286,6 +299,7 @@ impl Node {
     /// Tells the health service. A crash of the health service itself cannot be told this way, and is noted anyhow.
     pub(super) fn component(&mut self, now: Now, health: &ComponentHealth) {
         if let Some(place) = self.service_at(ServiceId::HEALTH) {
+            self.stirred = true;
             let ran = self.services[place].run(now, Input::Component(health));
             self.counters.crashes += u64::from(ran != Ran::Well);
             self.awake.push_back(place);
@@ -294,6 +308,7 @@ impl Node {
 
     pub(super) fn note(&mut self, now: Now, note: Note, effects: &mut Vec<Effect>) {
         if let Some(place) = self.service_at(ServiceId::LOG) {
+            self.stirred = true;
             let ran = self.services[place].run(now, Input::Note(&note));
             self.counters.crashes += u64::from(ran != Ran::Well);
             self.awake.push_back(place);

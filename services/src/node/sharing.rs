@@ -366,10 +366,10 @@ impl Node {
             lifespan_left_ms: None,
             priority: Priority::Data,
             skipped: 0,
-            via: Vec::new(),
+            via: Default::default(),
         };
         let key = self.keys.envelope(space, &label, None);
         let message = Message::new(Arc::new(label), aldis::encode(content).into());
-        effects.push(Effect::PublishOn(key, Envelope { message, stamp }));
+        effects.push(Effect::PublishOn(key, Box::new(Envelope { message, stamp })));
     }
 }

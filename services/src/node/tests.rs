@@ -413,7 +413,7 @@ fn publishers_are_declared_once_and_within_their_limit() {
         lifespan_left_ms: None,
         priority: Default::default(),
         skipped: 0,
-        via: vec![],
+        via: Default::default(),
     };
     let go = Envelope { message: Message::new(label, Bytes::new()), stamp };
     node.handle(Now::default(), &mut vec![Event::Sample(go)], &mut effects);

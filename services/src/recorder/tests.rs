@@ -24,7 +24,7 @@ fn envelope(sequence: u64, bytes: usize) -> Envelope {
         lifespan_left_ms: None,
         priority: Priority::Data,
         skipped: 0,
-        via: Vec::new(),
+        via: Default::default(),
     };
     Envelope { message: Message::new(Arc::new(label), vec![7; bytes].into()), stamp }
 }

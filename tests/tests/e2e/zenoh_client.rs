@@ -42,7 +42,7 @@ pub(crate) fn envelope(
         lifespan_left_ms: None,
         priority: Priority::Data,
         skipped: 0,
-        via: Vec::new(),
+        via: Default::default(),
     };
     let key = Keys::new(&Fleet::new("fleet").unwrap()).envelope(Space::Data, &label, None);
     let mut header = Vec::new();

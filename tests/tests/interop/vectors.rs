@@ -135,7 +135,7 @@ fn written(envelope: &Envelope) -> Value {
             "source_time": stamp.source_time,
             "lifespan_left_ms": stamp.lifespan_left_ms,
             "skipped": stamp.skipped,
-            "via": stamp.via,
+            "via": stamp.via.to_vec(),
             "change": change,
             "instance": keys().parse(&key).expect("an own key").instance.map(|hash| hash.to_string()),
             "key": serialized.filter(|_| !by_content).map(|key| hex(key)),

@@ -1,7 +1,7 @@
 //! From key, header and content to an envelope, with what is known of the stream kept.
 
 use super::reader::Reader;
-use super::{HeaderError, VERSION};
+use super::{HeaderError, NO_MORE, VERSION};
 use crate::call::Call;
 use crate::change::{Change, Instance};
 use crate::id::{BootId, EntityId};
@@ -9,7 +9,7 @@ use crate::key::escape::Spelling;
 use crate::key::{Keys, ParsedKey, Space, address_from_chunks, instance_chunk};
 use crate::message::{Attributes, Envelope, Label, Message};
 use crate::name::{ContentType, Descriptor, Group, Name};
-use crate::stamp::{Priority, Stamp, VIA_MAX};
+use crate::stamp::{Priority, Stamp, VIA_MAX, Via};
 use crate::time::Wall;
 use bytes::Bytes;
 use std::collections::BTreeMap;
@@ -42,9 +42,8 @@ pub struct Decoder {
 struct Known {
     constant: Box<[u8]>,
     label: Arc<Label>,
-    node: EntityId,
-    boot: BootId,
-    priority: Priority,
+    /// What all its stamps have in common; the rest is of one that says no more than its number and its time.
+    stamp: Stamp,
     space: Space,
     instance: Option<Arc<Instance>>,
     /// How many samples came, up to [`LEARNED_AFTER`].
@@ -68,17 +67,29 @@ impl Decoder {
         header: &[u8],
         content: Bytes,
     ) -> Result<Envelope, HeaderError> {
-        let known = self.known(key, header)?;
-        let mut rest = Reader::new(&header[known.constant.len()..]);
-        let stamp = read_stamp(&known, &mut rest)?;
-        let (change, instance, call) = read_change(&known, &mut rest, deleted)?;
-        match rest.left() {
-            0 => {
-                let label = known.label.clone();
-                Ok(Envelope { message: Message { label, change, instance, call, content }, stamp })
-            }
-            left => Err(HeaderError::Trailing(left)),
+        if !self.is_last(key, header) {
+            self.last = Some(self.find(key, header)?);
         }
+        let Some((_, known)) = &self.last else { return Err(HeaderError::Missing) };
+        let mut rest = Reader::new(&header[known.constant.len()..]);
+        let sequence = rest.varint("sequence")?;
+        if sequence == 0 {
+            return Err(invalid("sequence")("0, but streams count from 1"));
+        }
+        let source_time = Wall(rest.zigzag("source time")?);
+        let mut stamp = Stamp { sequence, source_time, ..known.stamp.clone() };
+        let (change, instance, call) = if !deleted && known.space == Space::Data && rest.is(&NO_MORE) {
+            (Change::Put, known.instance.clone(), None)
+        } else {
+            read_rest_of_stamp(&mut stamp, &mut rest)?;
+            read_change(known, &mut rest, deleted)?
+        };
+        if rest.left() > 0 {
+            return Err(HeaderError::Trailing(rest.left()));
+        }
+        let label = known.label.clone();
+        self.count();
+        Ok(Envelope { message: Message { label, change, instance, call, content }, stamp })
     }
 
     /// Whether the key of the last sample has come often enough to be declared, and is one of few of its label.
@@ -86,27 +97,23 @@ impl Decoder {
         std::mem::take(&mut self.learned)
     }
 
-    fn known(&mut self, key: &str, header: &[u8]) -> Result<Arc<Known>, HeaderError> {
-        if let Some((last, known)) = &self.last
-            && **last == *key
-            && header.starts_with(&known.constant)
-        {
-            let known = known.clone();
-            self.count(&known);
-            return Ok(known);
-        }
-        let remembered =
-            self.known.get_key_value(key).filter(|(_, known)| header.starts_with(&known.constant));
-        let (key, known) = match remembered {
-            Some((key, known)) => (key.clone(), known.clone()),
-            None => self.learn(key, header)?,
-        };
-        self.last = Some((key, known.clone()));
-        self.count(&known);
-        Ok(known)
+    /// Whether a sample is of the stream of the last one.
+    fn is_last(&self, key: &str, header: &[u8]) -> bool {
+        self.last.as_ref().is_some_and(|(last, known)| **last == *key && header.starts_with(&known.constant))
     }
 
-    fn count(&mut self, known: &Known) {
+    fn find(&mut self, key: &str, header: &[u8]) -> Result<(Arc<str>, Arc<Known>), HeaderError> {
+        let remembered =
+            self.known.get_key_value(key).filter(|(_, known)| header.starts_with(&known.constant));
+        match remembered {
+            Some((key, known)) => Ok((key.clone(), known.clone())),
+            None => self.learn(key, header),
+        }
+    }
+
+    /// One more sample of the last stream.
+    fn count(&mut self) {
+        let Some((_, known)) = &self.last else { return };
         // Not shared: the decoder alone counts, and is borrowed by whoever has it do so.
         let samples = known.samples.load(Ordering::Relaxed);
         if samples >= LEARNED_AFTER {
@@ -181,39 +188,33 @@ fn read_constant(key: &ParsedKey<'_>, header: &[u8]) -> Result<Known, HeaderErro
     let attributes = Attributes { content_type, descriptor, source_group, source: key.source };
     let label = Arc::new(Label { address, attributes });
     let instance = key.instance.map(|hash| Arc::new(Instance { hash, key: None }));
-    Ok(Known {
-        constant,
-        label,
+    let stamp = Stamp {
         node,
         boot,
+        sequence: 0,
+        source_time: Wall(0),
+        lifespan_left_ms: None,
         priority,
-        space: key.space,
-        instance,
-        samples: AtomicU32::new(0),
-    })
+        skipped: 0,
+        via: Via::default(),
+    };
+    Ok(Known { constant, label, stamp, space: key.space, instance, samples: AtomicU32::new(0) })
 }
 
-fn read_stamp(known: &Known, rest: &mut Reader<'_>) -> Result<Stamp, HeaderError> {
-    let sequence = rest.varint("sequence")?;
-    if sequence == 0 {
-        return Err(invalid("sequence")("0, but streams count from 1"));
-    }
-    let source_time = Wall(rest.zigzag("source time")?);
-    let lifespan_left_ms = match rest.present("lifespan")? {
+fn read_rest_of_stamp(stamp: &mut Stamp, rest: &mut Reader<'_>) -> Result<(), HeaderError> {
+    stamp.lifespan_left_ms = match rest.present("lifespan")? {
         true => Some(rest.varint_u32("lifespan")?),
         false => None,
     };
-    let skipped = rest.varint_u32("skipped")?;
+    stamp.skipped = rest.varint_u32("skipped")?;
     let passed = rest.varint("via")?;
     if passed > VIA_MAX as u64 {
         return Err(invalid("via")(format!("{passed} nodes passed, at most {VIA_MAX} are allowed")));
     }
-    let mut via = Vec::new();
     for _ in 0..passed {
-        via.push(EntityId::new(rest.varint("via")?).map_err(invalid("via"))?);
+        stamp.via.push(EntityId::new(rest.varint("via")?).map_err(invalid("via"))?);
     }
-    let Known { node, boot, priority, .. } = *known;
-    Ok(Stamp { node, boot, sequence, source_time, lifespan_left_ms, priority, skipped, via })
+    Ok(())
 }
 
 type Changed = (Change, Option<Arc<Instance>>, Option<Box<Call>>);

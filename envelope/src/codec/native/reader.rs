@@ -2,6 +2,17 @@
 
 use super::HeaderError;
 
+/// The bits that say that a number goes on, in eight of its bytes.
+const CONTINUED: u64 = 0x8080_8080_8080_8080;
+
+/// The seven low bits of each of eight bytes, side by side.
+fn joined(bytes: u64) -> u64 {
+    let seven = bytes & !CONTINUED;
+    let fourteen = (seven & 0x007f_007f_007f_007f) | (seven & 0x7f00_7f00_7f00_7f00) >> 1;
+    let half = (fourteen & 0x0000_3fff_0000_3fff) | (fourteen & 0x3fff_0000_3fff_0000) >> 2;
+    (half & 0x0fff_ffff) | (half & 0x0fff_ffff_0000_0000) >> 4
+}
+
 /// A place in a header.
 pub(super) struct Reader<'a> {
     rest: &'a [u8],
@@ -14,6 +25,15 @@ impl<'a> Reader<'a> {
 
     pub(super) fn left(&self) -> usize {
         self.rest.len()
+    }
+
+    /// Whether exactly these bytes are left, which are taken then.
+    pub(super) fn is(&mut self, bytes: &[u8]) -> bool {
+        let is = self.rest == bytes;
+        if is {
+            self.rest = &[];
+        }
+        is
     }
 
     pub(super) fn byte(&mut self, field: &'static str) -> Result<u8, HeaderError> {
@@ -44,6 +64,14 @@ impl<'a> Reader<'a> {
     }
 
     fn long_varint(&mut self, field: &'static str) -> Result<u64, HeaderError> {
+        if let Some((eight, [ninth, rest @ ..])) = self.rest.split_first_chunk::<8>()
+            && *ninth < 0x80
+            && u64::from_le_bytes(*eight) & CONTINUED == CONTINUED
+        {
+            // Nine bytes: what the nanoseconds of this century take.
+            self.rest = rest;
+            return Ok(joined(u64::from_le_bytes(*eight)) | u64::from(*ninth) << 56);
+        }
         let (mut number, mut shift) = (0u64, 0);
         for (place, &byte) in self.rest.iter().enumerate() {
             if shift == 63 && byte > 1 {

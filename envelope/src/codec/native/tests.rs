@@ -97,7 +97,7 @@ prop_compose! {
     ) -> Stamp {
         Stamp {
             node, boot: BootId(boot), sequence, source_time: Wall(time), lifespan_left_ms,
-            priority: Priority::try_from(priority).unwrap(), skipped, via,
+            priority: Priority::try_from(priority).unwrap(), skipped, via: via.into_iter().collect(),
         }
     }
 }

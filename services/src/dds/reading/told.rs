@@ -18,7 +18,7 @@ pub(super) fn envelope(from: Participant, label: &Arc<Label>, sample: Retained) 
         lifespan_left_ms: None,
         priority: Priority::Data,
         skipped: 0,
-        via: Vec::new(),
+        via: Default::default(),
     };
     let message = Message { change, instance, ..Message::new(label.clone(), content.into()) };
     Envelope { message, stamp }

@@ -14,7 +14,7 @@ pub(in super::super) fn envelope(sequence: u64, content: &'static [u8]) -> Envel
         lifespan_left_ms: None,
         priority: Priority::Data,
         skipped: 0,
-        via: Vec::new(),
+        via: Default::default(),
     };
     Envelope { message: Message::new(label, Bytes::from_static(content)), stamp }
 }

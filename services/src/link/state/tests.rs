@@ -144,7 +144,7 @@ proptest! {
         held_time in -1_000_000_000_000i64..2_000_000_000_000_000,
     ) {
         let (mut states, mut held, mut names) = (States::default(), Held::default(), Names::default());
-        let origin = Origin { node: EntityId::new(1).unwrap(), boot: BootId(1), via: vec![] };
+        let origin = Origin { node: EntityId::new(1).unwrap(), boot: BootId(1), via: Default::default() };
         names.insert(0, Definition::Origin(origin)).ok();
         for (&number, &(sequence, time)) in &steps {
             names.insert(number, Definition::Instance(entry())).ok();

@@ -36,7 +36,7 @@ impl Node {
             lifespan_left_ms: None,
             priority: Priority::Data,
             skipped: 0,
-            via: Vec::new(),
+            via: Default::default(),
         };
         self.links.told = alive;
         let envelope = Envelope { message, stamp };

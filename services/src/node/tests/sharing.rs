@@ -228,7 +228,7 @@ fn what_nodes_tell_one_another_is_believed_of_their_own_source_alone() {
         lifespan_left_ms: None,
         priority: Priority::Data,
         skipped: 0,
-        via: Vec::new(),
+        via: Default::default(),
     };
     let message = Message::new(Arc::new(label), Bytes::from_static(b"\xff\xff\xff"));
     world.give(node, Event::Sample(Envelope { message: message.clone(), stamp: stamp.clone() }));

@@ -30,7 +30,7 @@ fn stamp(node: u64, sequence: u64, at: Duration, lifespan: Option<Duration>) -> 
         lifespan_left_ms: lifespan.map(|lifespan| lifespan.as_millis() as u32),
         priority: Priority::Data,
         skipped: 0,
-        via: Vec::new(),
+        via: Default::default(),
     }
 }
 

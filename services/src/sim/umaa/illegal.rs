@@ -145,7 +145,7 @@ impl Rogue {
             lifespan_left_ms: None,
             priority: Priority::Data,
             skipped: 0,
-            via: Vec::new(),
+            via: Default::default(),
         };
         let envelope = Envelope { message, stamp };
         self.flow.published(&envelope);

@@ -369,7 +369,7 @@ impl Bus {
             lifespan_left_ms: None,
             priority: Priority::Data,
             skipped: 0,
-            via: Vec::new(),
+            via: Default::default(),
         };
         let envelope = Envelope { message, stamp };
         self.checker.published(&envelope);

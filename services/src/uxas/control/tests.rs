@@ -40,7 +40,7 @@ fn mission(from: Source) -> Envelope {
         lifespan_left_ms: None,
         priority: Priority::Data,
         skipped: 0,
-        via: Vec::new(),
+        via: Default::default(),
     };
     let content = encode(&mission as &dyn Object).unwrap();
     Envelope { message: Message::new(Arc::new(label), content.into()), stamp }

@@ -18,7 +18,7 @@ fn now(seconds: f64) -> Now {
 
 fn envelope(message: Message) -> Envelope {
     let (node, boot, sequence, source_time) = (message.label.source().entity, BootId(1), 1, Wall(0));
-    let (lifespan_left_ms, priority, skipped, via) = (None, Priority::Data, 0, Vec::new());
+    let (lifespan_left_ms, priority, skipped, via) = (None, Priority::Data, 0, Default::default());
     Envelope {
         message,
         stamp: Stamp { node, boot, sequence, source_time, lifespan_left_ms, priority, skipped, via },
