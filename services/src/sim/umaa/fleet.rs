@@ -31,6 +31,8 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 const SECOND: Duration = Duration::from_secs(1);
+/// How long providers wait for commands that were lost: longer than a chain of faults keeps consumers away.
+pub(super) const ORPHANS_WAIT: Duration = Duration::from_secs(90);
 
 /// What is wrong on purpose, to see that it is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -181,7 +183,7 @@ fn provider_settings() -> ProviderSettings {
         validate_within: Some(5 * SECOND),
         start_within: Some(6 * SECOND),
         execute_within: Some(20 * SECOND),
-        orphans_wait: 90 * SECOND,
+        orphans_wait: ORPHANS_WAIT,
         ..ProviderSettings::default()
     }
 }
