@@ -46,6 +46,15 @@ impl Tamper for Unconfirmed {
     }
 }
 
+/// A service does not hear that it is out of contact.
+pub(super) struct Unaware;
+
+impl Tamper for Unaware {
+    fn hears(&mut self, _: Now, input: &Input<'_>) -> bool {
+        !matches!(input, Input::Token(_, false) | Input::Bus(false))
+    }
+}
+
 /// A service does not hear what statuses its former life has left.
 pub(super) struct Forgetful;
 

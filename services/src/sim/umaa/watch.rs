@@ -52,11 +52,11 @@ fn bounds(options: &Options) -> Bounds {
     if some.iter().all(Option::is_none) && shares == [0.0; 3] {
         return usual;
     }
-    // The longest wait of the machines is that for commands that were lost.
-    let outage = ORPHANS_WAIT + 2 * faults.lasts_at_most + 2 * options.notice;
+    let outage = Duration::from_secs(30) + 2 * faults.lasts_at_most + 2 * options.notice;
     Bounds {
         answer: usual.answer + outage,
-        clean_up: usual.clean_up + outage,
+        // What was said of a command that was lost is cleaned up when nobody waits for it any more.
+        clean_up: usual.clean_up + outage.max(ORPHANS_WAIT + 2 * faults.lasts_at_most),
         follow: usual.follow + outage,
         unheard: outage,
         ..usual
