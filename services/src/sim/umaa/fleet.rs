@@ -12,7 +12,7 @@ use super::outside::{Calm, Outside};
 use super::saboteur::Saboteur;
 use super::scripted::{Helm, Scripted};
 use super::tally::Tally;
-use super::tamper::{Forgetful, Honest, Tamper, Unaware, Unconfirmed};
+use super::tamper::{Forgetful, Honest, Stale, Tamper, Unconfirmed};
 use super::tampered::Tampered;
 use super::watch::{Findings, Watch};
 use crate::dds::{Durability, Keep, Qos, TopicRule};
@@ -37,7 +37,7 @@ pub(super) const ORPHANS_WAIT: Duration = Duration::from_secs(90);
 /// What is wrong on purpose, to see that it is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Planted {
-    /// Guards believe a report for ever, however long ago it was repeated, and out of contact with its arbiter too.
+    /// Guards believe reports for ever, and go by those of a while ago.
     StaleGuard,
     /// The arbiter does not wait until its report is confirmed.
     UnconfirmedControl,
@@ -130,7 +130,9 @@ impl UmaaFleet {
             Some(Planted::UnconfirmedControl) if source == arrangement.arbiter => {
                 Box::new(|| -> Box<dyn Tamper> { Box::new(Unconfirmed) })
             }
-            Some(Planted::StaleGuard) if provides => Box::new(|| -> Box<dyn Tamper> { Box::new(Unaware) }),
+            Some(Planted::StaleGuard) if provides => {
+                Box::new(|| -> Box<dyn Tamper> { Box::<Stale>::default() })
+            }
             Some(Planted::ForgottenStatus) if provides => {
                 Box::new(|| -> Box<dyn Tamper> { Box::new(Forgetful) })
             }
