@@ -12,6 +12,9 @@ const MIN_RUN_TIME: Duration = Duration::from_secs(10);
 const RESTART_DELAY_MIN: Duration = Duration::from_secs(1);
 /// The longest wait before a restart.
 const RESTART_DELAY_MAX: Duration = Duration::from_secs(60);
+/// The longest wait before a restart that the disk is to blame for: it may work again long before a service would that crashes
+/// by itself.
+const REFUSED_DELAY_MAX: Duration = Duration::from_secs(8);
 
 /// What a service did with an input.
 #[derive(Debug, PartialEq, Eq)]
@@ -206,20 +209,21 @@ impl Hosted {
     }
 
     fn crash(&mut self, now: Now, panic: &(dyn Any + Send)) -> Ran {
-        self.fail(now, panic_text(panic))
+        self.end_life(now, panic_text(panic), RESTART_DELAY_MAX)
     }
 
-    /// Ends this life of the service; the next begins by itself.
-    pub(crate) fn fail(&mut self, now: Now, text: String) -> Ran {
+    /// Ends this life of the service because what it says is refused; the next begins by itself.
+    pub(crate) fn refuse(&mut self, now: Now, text: String) -> Ran {
+        self.end_life(now, text, REFUSED_DELAY_MAX)
+    }
+
+    fn end_life(&mut self, now: Now, text: String, delay_max: Duration) -> Ran {
         self.service = None;
         self.deadline = None;
         self.outbox.forget();
         let ran = now.monotonic - self.started_at;
-        self.restart_delay = if ran >= MIN_RUN_TIME {
-            RESTART_DELAY_MIN
-        } else {
-            (self.restart_delay * 2).min(RESTART_DELAY_MAX)
-        };
+        self.restart_delay =
+            if ran >= MIN_RUN_TIME { RESTART_DELAY_MIN } else { (self.restart_delay * 2).min(delay_max) };
         self.restart_at = Some(now.monotonic + self.restart_delay);
         self.outbox.note(Level::Error, format!("service {} crashed: {text}", self.spec.source));
         Ran::Crashed(text)
@@ -230,4 +234,40 @@ impl Hosted {
 pub(crate) fn panic_text(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "without a text".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use aldis_envelope::{EntityId, ServiceId, Source, Wall};
+    use std::sync::Arc;
+
+    struct Idle;
+
+    impl Service for Idle {
+        fn handle(&mut self, _: Now, _: Input<'_>, _: &mut Outbox) {}
+    }
+
+    /// The wait before the last of many restarts, where each life ends as soon as it has begun.
+    fn last_wait(end: impl Fn(&mut Hosted, Now) -> Ran) -> Duration {
+        let source = Source::new(EntityId::new(400).unwrap(), ServiceId::new(100).unwrap());
+        let factory = Arc::new(|| Box::new(Idle) as Box<dyn Service>);
+        let mut hosted = Hosted::new(ServiceSpec { source, name: "idle".into(), factory });
+        let mut at = Monotonic::START;
+        let mut wait = Duration::ZERO;
+        for _ in 0..10 {
+            let now = Now { monotonic: at, wall: Wall(0) };
+            hosted.start(now);
+            end(&mut hosted, now);
+            let next = hosted.next_deadline().unwrap();
+            (wait, at) = (next - at, next);
+        }
+        wait
+    }
+
+    #[test]
+    fn a_service_that_the_disk_refuses_is_back_sooner_than_one_that_crashes() {
+        assert_eq!(last_wait(|hosted, now| hosted.crash(now, &"a bug")), RESTART_DELAY_MAX);
+        assert_eq!(last_wait(|hosted, now| hosted.refuse(now, "a full disk".into())), REFUSED_DELAY_MAX);
+    }
 }

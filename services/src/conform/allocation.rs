@@ -44,6 +44,15 @@ impl Former {
     }
 }
 
+/// A consumer whose allocation was interrupted: its resource was taken from it, unless reports go on to name it.
+#[derive(Debug)]
+struct Interrupted {
+    loser: Guid,
+    /// The list that was in force.
+    list: Vec<Guid>,
+    since: Monotonic,
+}
+
 /// What an arbiter has reported last.
 #[derive(Debug, Default)]
 struct Arbiter {
@@ -63,8 +72,8 @@ pub(super) struct Allocations {
     arbiters: BTreeMap<Guid, Arbiter>,
     /// By session.
     executing: BTreeMap<Guid, Holder>,
-    /// Whom a resource was taken from, and the list that was in force, until it is given to somebody or free.
-    interrupted: BTreeMap<Guid, (Guid, Vec<Guid>)>,
+    /// By resource, until it is given to somebody or free.
+    interrupted: BTreeMap<Guid, Interrupted>,
 }
 
 fn debt(clause: Clause, resource: Guid, who: Guid) -> Debt {
@@ -78,14 +87,10 @@ fn rank(list: &[Guid], consumer: Guid) -> Option<usize> {
 
 /// Whether a resource is taken from a consumer for one of higher priority, by the list then or by the list now: a new one may
 /// have come in between.
-fn judge_take_over(
-    resource: Guid,
-    (loser, then): (Guid, &[Guid]),
-    (winner, now): (Guid, &[Guid]),
-    ledger: &mut Ledger,
-) {
+fn judge_take_over(resource: Guid, taken: &Interrupted, (winner, now): (Guid, &[Guid]), ledger: &mut Ledger) {
+    let loser = taken.loser;
     let goes_before = |list: &[Guid]| rank(list, winner) > rank(list, loser);
-    ledger.judge(Clause::TakeOver, goes_before(now) || goes_before(then), || {
+    ledger.judge(Clause::TakeOver, goes_before(now) || goes_before(&taken.list), || {
         format!("resource {resource} is taken from {loser} for {winner}, which is not of higher priority")
     });
 }
@@ -142,12 +147,15 @@ impl Allocations {
                 let list =
                     |resource: &Guid| arbiter.priorities.get(resource).map(Vec::as_slice).unwrap_or_default();
                 for (resource, holder) in &holders {
-                    let is_over = |(loser, _): &(Guid, Vec<Guid>)| *holder != Some(*loser);
-                    if self.interrupted.get(resource).is_some_and(is_over)
-                        && let Some((loser, then)) = self.interrupted.remove(resource)
-                        && let Some(winner) = *holder
+                    // A report from before the interruption may come after it.
+                    let is_of_before = |taken: &Interrupted| {
+                        *holder == Some(taken.loser) && now - taken.since < bounds.slack
+                    };
+                    if !self.interrupted.get(resource).is_some_and(is_of_before)
+                        && let Some(taken) = self.interrupted.remove(resource)
+                        && let Some(winner) = holder.filter(|holder| *holder != taken.loser)
                     {
-                        judge_take_over(*resource, (loser, &then), (winner, list(resource)), ledger);
+                        judge_take_over(*resource, &taken, (winner, list(resource)), ledger);
                     }
                 }
                 arbiter.holders = holders;
@@ -245,9 +253,9 @@ impl Allocations {
             format!("resource {resource} is given to {consumer}, which is not on its list")
         });
         // A report that names the winner comes before; where it does not, this is the first that is seen of it.
-        let taken = self.interrupted.remove(&resource).filter(|(loser, _)| *loser != consumer);
-        if let Some((loser, then)) = taken {
-            judge_take_over(resource, (loser, &then), (consumer, list), ledger);
+        let taken = self.interrupted.remove(&resource).filter(|taken| taken.loser != consumer);
+        if let Some(taken) = taken {
+            judge_take_over(resource, &taken, (consumer, list), ledger);
         }
         let told = known.and_then(|arbiter| *arbiter.holders.get(&resource)?);
         ledger.judge(Clause::ReportFirst, told == Some(consumer), || {
@@ -263,7 +271,8 @@ impl Allocations {
         ledger.pay(&debt(Clause::Expiry, resource, step.session));
         if step.reason == "INTERRUPTED" {
             let list = self.arbiters.get(&arbiter).and_then(|arbiter| arbiter.priorities.get(&resource));
-            self.interrupted.insert(resource, (consumer, list.cloned().unwrap_or_default()));
+            let (list, since) = (list.cloned().unwrap_or_default(), ledger.now());
+            self.interrupted.insert(resource, Interrupted { loser: consumer, list, since });
         }
         let goes_on =
             self.executing.values().any(|other| (other.resource, other.consumer) == (resource, consumer));

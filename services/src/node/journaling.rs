@@ -339,7 +339,7 @@ impl Node {
         if self.services[place].goes_by_what_is_kept() {
             self.keeping.drop_all_of(origin);
             self.work.retain(|work| work.origin != origin);
-            let ran = self.services[place].fail(now, format!("what it says is not kept: {why}"));
+            let ran = self.services[place].refuse(now, format!("what it says is not kept: {why}"));
             self.after(now, place, ran, effects);
         }
     }

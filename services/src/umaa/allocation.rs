@@ -18,6 +18,7 @@
 //! | [`Arbiter`], a second session before control is given | 5.1.3 | takes the place of the first, which is FAILED / INTERRUPTED: COMPLETED would have to say EXECUTING first |
 //! | [`Guard`], between COMMANDED and EXECUTING | 5.1.3 | the consumer has to be in control still, after a restart of the provider too: nothing moves yet, and another may have taken over |
 //! | [`Arbiter`], a holder that a new list leaves out | 5.1.3 | keeps control, and cannot renew it: a new list does not move control that is held |
+//! | [`Arbiter`], a command that is not there after a restart | 4.1.2.1, 5.1.3 | FAILED / SERVICE_FAILED at once, and the report names its consumer no more: were its status left to stand until its consumer is in contact, another would be given control beside it |
 //! | [`Arbiter`], priorities after a restart | 5.1.3 | those of the former life, which the ICD publishes for persistence; the log says where the configuration differs |
 
 mod arbiter;

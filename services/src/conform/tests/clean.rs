@@ -141,6 +141,28 @@ fn a_second_session_of_the_holder_takes_over_from_the_first() {
 }
 
 #[test]
+fn control_that_goes_on_with_a_newer_session_was_not_taken() {
+    let mut scene = Scene::with_priorities();
+    scene.give(BOB, 21, None);
+    scene.allocate(BOB, 21, None);
+    scene.status(ALLOCATION, ARBITER, 21, "ISSUED", "UPDATED");
+    scene.ack(ALLOCATION, ARBITER, 21);
+    scene.status(ALLOCATION, ARBITER, 21, "COMMANDED", "SUCCEEDED");
+    // Bob's newer session goes before his renewal.
+    scene.allocate(BOB, 22, None);
+    scene.accept(ALLOCATION, ARBITER, 22);
+    scene.status(ALLOCATION, ARBITER, 21, "FAILED", "INTERRUPTED");
+    scene.control(Some(BOB));
+    scene.clean_up(ALLOCATION, ARBITER, 21);
+    scene.command_change(ALLOCATION, 22, Observed::Dispose);
+    scene.status(ALLOCATION, ARBITER, 22, "CANCELED", "CANCELED");
+    scene.clear(ALLOCATION, ARBITER, 22);
+    // Nobody is in control now, and Alice may be.
+    scene.give(ALICE, 23, None);
+    assert_eq!(finished(scene), []);
+}
+
+#[test]
 fn an_arbiter_that_starts_again_clears_up_without_a_last_word() {
     let mut scene = Scene::with_priorities();
     scene.give(ALICE, 21, Some(3.0));

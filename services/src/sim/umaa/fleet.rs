@@ -12,7 +12,7 @@ use super::outside::{Calm, Outside};
 use super::saboteur::Saboteur;
 use super::scripted::{Helm, Scripted};
 use super::tally::Tally;
-use super::tamper::{Forgetful, Honest, Tamper, Unconfirmed};
+use super::tamper::{Forgetful, Honest, Stale, Tamper, Unconfirmed};
 use super::tampered::Tampered;
 use super::watch::{Findings, Watch};
 use crate::dds::{Durability, Keep, Qos, TopicRule};
@@ -31,11 +31,13 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 const SECOND: Duration = Duration::from_secs(1);
+/// How long providers wait for commands that were lost: longer than a chain of faults keeps consumers away.
+pub(super) const ORPHANS_WAIT: Duration = Duration::from_secs(90);
 
 /// What is wrong on purpose, to see that it is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Planted {
-    /// Guards believe a report for ever, however long ago it was repeated.
+    /// Guards believe reports for ever, and go by those of a while ago.
     StaleGuard,
     /// The arbiter does not wait until its report is confirmed.
     UnconfirmedControl,
@@ -128,6 +130,9 @@ impl UmaaFleet {
             Some(Planted::UnconfirmedControl) if source == arrangement.arbiter => {
                 Box::new(|| -> Box<dyn Tamper> { Box::new(Unconfirmed) })
             }
+            Some(Planted::StaleGuard) if provides => {
+                Box::new(|| -> Box<dyn Tamper> { Box::<Stale>::default() })
+            }
             Some(Planted::ForgottenStatus) if provides => {
                 Box::new(|| -> Box<dyn Tamper> { Box::new(Forgetful) })
             }
@@ -181,7 +186,7 @@ fn provider_settings() -> ProviderSettings {
         validate_within: Some(5 * SECOND),
         start_within: Some(6 * SECOND),
         execute_within: Some(20 * SECOND),
-        orphans_wait: 90 * SECOND,
+        orphans_wait: ORPHANS_WAIT,
         ..ProviderSettings::default()
     }
 }

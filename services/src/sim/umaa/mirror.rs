@@ -4,8 +4,10 @@
 use super::wrote::Wrote;
 use crate::service::{Input, Outbox, Service};
 use crate::sim::observe::{Checker, Fact, Facts, Observation, Seen};
-use aldis_envelope::{Change, EntityId, Envelope, KeyHash, Monotonic, Now, Prefix, ServiceId, Source, Wall};
-use std::collections::{BTreeMap, BTreeSet};
+use aldis_envelope::{
+    BootId, Change, EntityId, Envelope, KeyHash, Monotonic, Now, Prefix, ServiceId, Source, Wall,
+};
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -57,7 +59,8 @@ pub(super) struct Told(Arc<Mutex<BTreeMap<InstanceId, InstanceTold>>>);
 
 #[derive(Debug, Default)]
 struct InstanceTold {
-    samples: BTreeSet<Sample>,
+    /// Each sample with the life that said it last.
+    samples: BTreeMap<Sample, BootId>,
     last: Option<Sample>,
 }
 
@@ -65,14 +68,15 @@ struct InstanceTold {
 type Sample = (Wall, u32);
 
 impl Told {
-    /// Whether a sample is to be told: a new one, or the last one again, which a new life retains.
+    /// Whether a sample is to be told: a new one, or the last one again, which a new life retains. What one life says twice is
+    /// new each time: statuses of one moment are alike.
     fn is_to_be_told(&self, id: &InstanceId, envelope: &Envelope) -> bool {
         let Envelope { message, stamp } = envelope;
         let what = (message.change == Change::Put).then(|| crc32fast::hash(&message.content));
         let sample = (stamp.source_time, what.unwrap_or(message.change as u32));
         let mut told = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let told = told.entry(id.clone()).or_default();
-        let is_new = told.samples.insert(sample);
+        let is_new = told.samples.insert(sample, stamp.boot).is_none_or(|life| life == stamp.boot);
         if is_new {
             told.last = Some(sample);
         }
@@ -187,5 +191,42 @@ impl Checker for Mirrors {
             }
         });
         wrong
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use aldis_envelope::{ContentType, Instance, Label, Message, Name, Priority, Stamp};
+    use bytes::Bytes;
+
+    fn said(boot: u64, sequence: u64, content: &'static str) -> Envelope {
+        let writer = Source::new(EntityId::new(1).unwrap(), ServiceId::ALLOCATION);
+        let label = Label::broadcast(ContentType::Umaa, Name::new("UMAA::SO::X::X").unwrap(), writer);
+        let message = Message::new(Arc::new(label), Bytes::from_static(content.as_bytes()));
+        let stamp = Stamp {
+            node: writer.entity,
+            boot: BootId(boot),
+            sequence,
+            source_time: Wall(5),
+            lifespan_left_ms: None,
+            priority: Priority::Data,
+            skipped: 0,
+            via: Vec::new(),
+        };
+        Envelope { message: message.of_instance(Instance::of_number(1)), stamp }
+    }
+
+    #[test]
+    fn what_a_life_says_is_told_each_time_and_what_it_retains_of_another_once() {
+        let told = Told::default();
+        let hears = |envelope: &Envelope| told.is_to_be_told(&id_of(envelope).unwrap(), envelope);
+        let moment = ["COMMANDED", "ISSUED", "COMMANDED"];
+        for (number, state) in moment.into_iter().enumerate() {
+            assert!(hears(&said(1, number as u64, state)), "{number}: {state}");
+        }
+        assert!(!hears(&said(2, 1, "ISSUED")), "an older word of the former life");
+        assert!(hears(&said(2, 2, "COMMANDED")), "its last word, which stands");
+        assert!(hears(&said(2, 3, "EXECUTING")));
     }
 }

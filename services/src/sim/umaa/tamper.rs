@@ -1,7 +1,10 @@
 //! What stands in the way of a service on purpose: to see that it is found.
 
 use crate::service::{Action, Input};
+use aldis_envelope::umaa::{ResourceAllocationReport, Topic};
 use aldis_envelope::{Envelope, Monotonic, Now};
+use std::collections::VecDeque;
+use std::time::Duration;
 
 /// Changes what a service hears and says.
 pub(super) trait Tamper: Send {
@@ -43,6 +46,43 @@ impl Tamper for Unconfirmed {
             }
             action => wanted.push(action),
         }
+    }
+}
+
+/// How old the reports are that a stale guard goes by.
+const STALE_BY: Duration = Duration::from_secs(1);
+
+/// A service goes by reports of control that are of a while ago. Its node has confirmed them all the same.
+#[derive(Default)]
+pub(super) struct Stale {
+    waiting: VecDeque<(Monotonic, Envelope)>,
+    /// What has waited is heard now.
+    lets_through: bool,
+}
+
+impl Tamper for Stale {
+    fn hears(&mut self, now: Now, input: &Input<'_>) -> bool {
+        match input {
+            Input::Message(envelope)
+                if envelope.message.label.descriptor() == ResourceAllocationReport::NAME
+                    && !std::mem::take(&mut self.lets_through) =>
+            {
+                self.waiting.push_back((now.monotonic + STALE_BY, (*envelope).clone()));
+                false
+            }
+            _ => true,
+        }
+    }
+
+    fn due(&mut self, now: Now) -> Option<Envelope> {
+        self.next_deadline().filter(|at| *at <= now.monotonic)?;
+        let (_, envelope) = self.waiting.pop_front()?;
+        self.lets_through = true;
+        Some(envelope)
+    }
+
+    fn next_deadline(&self) -> Option<Monotonic> {
+        self.waiting.front().map(|(at, _)| *at)
     }
 }
 

@@ -1,6 +1,7 @@
 //! The conformance monitor as a checker: it is told what is written, at its source and in its order.
 
 use super::commands::{RudderCommand, VectorCommand, VectorExecutionStatus};
+use super::fleet::ORPHANS_WAIT;
 use super::outside::entity_of;
 use super::tampered::LifeEnded;
 use super::wrote::Wrote;
@@ -46,13 +47,16 @@ fn bounds(options: &Options) -> Bounds {
     // Commands here run for seconds, and what does not follow within them would never be missed.
     let usual = Bounds { unheard, written, follow: Duration::from_secs(2), ..Bounds::default() };
     let some = [faults.session_drops, faults.partitions, faults.crashes, faults.stalls];
-    if some.iter().all(Option::is_none) && faults.sample_loss == 0.0 {
+    // A service that the disk refuses starts again.
+    let shares = [faults.sample_loss, faults.disk.sync_fails, faults.disk.write_fails];
+    if some.iter().all(Option::is_none) && shares == [0.0; 3] {
         return usual;
     }
-    let outage = Duration::from_secs(60) + 2 * faults.lasts_at_most + 2 * options.notice;
+    let outage = Duration::from_secs(30) + 2 * faults.lasts_at_most + 2 * options.notice;
     Bounds {
         answer: usual.answer + outage,
-        clean_up: usual.clean_up + outage,
+        // What was said of a command that was lost is cleaned up when nobody waits for it any more.
+        clean_up: usual.clean_up + outage.max(ORPHANS_WAIT + 2 * faults.lasts_at_most),
         follow: usual.follow + outage,
         unheard: outage,
         ..usual

@@ -300,6 +300,11 @@ impl Executor<ResourceAllocationCommand> for Control {
         true
     }
 
+    /// The report of this life does not name whose command is not there, and another may be given control.
+    fn awaits_lost_commands(&self) -> bool {
+        false
+    }
+
     /// The reports of other arbiters.
     fn subscriptions(&self) -> Vec<Prefix> {
         Prefix::new(ResourceAllocationReport::NAME).into_iter().collect()

@@ -56,6 +56,12 @@ pub trait Executor<C: Command>: Send {
         state != CommandState::Executing
     }
 
+    /// Whether the status of a command that nobody has told of at the start may stand until it is known whether the command
+    /// comes back. Where it may not, because what it says keeps others from being executed, the command fails at once.
+    fn awaits_lost_commands(&self) -> bool {
+        true
+    }
+
     /// What it subscribes to beside its commands.
     fn subscriptions(&self) -> Vec<Prefix> {
         Vec::new()

@@ -430,6 +430,25 @@ fn control_whose_consumer_has_gone_is_cleared_at_the_start_of_the_arbiter() {
 }
 
 #[test]
+fn a_holder_whose_command_is_not_there_when_the_arbiter_starts_again_is_none_beside_the_next() {
+    let mut sea = sea();
+    let (one, two) = (allocating(&mut sea.bus, captain(1)), allocating(&mut sea.bus, captain(2)));
+    sea.allocate(&one, captain(1), None);
+    sea.run(1.0);
+    sea.bus.crash(arbiter());
+    sea.bus.silence(arbiter(), captain(1));
+    sea.bus.start(arbiter());
+    sea.allocate(&two, captain(2), None);
+    sea.run(10.0);
+    assert_eq!((told(two.take()).as_str(), sea.holder()), (ALL, Some(guid(captain(2)))));
+    sea.is_lawful();
+    sea.bus.heal(arbiter(), captain(1));
+    sea.run(1.0);
+    assert_eq!(told(one.take()), format!("{ALL} FAILED/SERVICE_FAILED"));
+    sea.is_lawful();
+}
+
+#[test]
 fn a_shutdown_fails_what_is_open_and_ends_the_reports() {
     let mut sea = sea();
     let one = allocating(&mut sea.bus, captain(1));

@@ -6,7 +6,7 @@
 //! | with a status that is not terminal | its executor goes on from there, or it fails with SERVICE_FAILED |
 //! | with a terminal one | nothing is published, the consumer's dispose is awaited |
 //! | updated since it was acknowledged | as the update that it is |
-//! | a status that is not terminal, without its command | FAILED / SERVICE_FAILED: nobody executes it |
+//! | a status that is not terminal, without its command | FAILED / SERVICE_FAILED: nobody executes it. At once where its executor does not await it, else when all have told |
 //! | status, acknowledgement or execution status without their command | disposed, once the command cannot come any more |
 
 use super::super::decisions::{is_orphan, is_update};
@@ -28,13 +28,25 @@ struct Left<C> {
     state: Option<(DateTime, CommandState)>,
     ack: Option<CommandAckReport<C>>,
     execution_status: bool,
+    /// Whether the own node has told of it, which has all of it in its order.
+    is_told_by_own: bool,
     /// Whether the consumer is known to be alive.
     consumer_is_here: bool,
 }
 
 impl<C> Default for Left<C> {
     fn default() -> Self {
-        Self { state: None, ack: None, execution_status: false, consumer_is_here: false }
+        let (state, ack) = (None, None);
+        Self { state, ack, execution_status: false, is_told_by_own: false, consumer_is_here: false }
+    }
+}
+
+impl<C> Left<C> {
+    /// Whether something counts that is told of the session. The own node tells in the order of writing, whatever the clock said
+    /// then. Another node may be behind: what is older than what is known says nothing.
+    fn believes(&mut self, told: DateTime, known: Option<DateTime>, by_own: bool) -> bool {
+        self.is_told_by_own |= by_own;
+        by_own || !self.is_told_by_own && known.is_none_or(|known| told >= known)
     }
 }
 
@@ -59,7 +71,7 @@ impl<C> Past<C> {
 
 impl<C: Command, E: Executor<C>, A: Admission> Provider<C, E, A> {
     /// A sample of a former life: told by the own node, or by one that retains it for this one.
-    pub(super) fn remember(&mut self, envelope: &Envelope) {
+    pub(super) fn remember(&mut self, envelope: &Envelope, by_own: bool) {
         let is_own = envelope.message.label.source() == self.source;
         if self.stage != Stage::Listening || envelope.message.change != Change::Put || !is_own {
             return;
@@ -67,11 +79,11 @@ impl<C: Command, E: Executor<C>, A: Admission> Provider<C, E, A> {
         let content = &envelope.message.content;
         if is_about::<CommandStatus<C>>(envelope) {
             if let Ok(status) = umaa::decode(content) {
-                self.remember_status(&status);
+                self.remember_status(&status, by_own);
             }
         } else if is_about::<CommandAckReport<C>>(envelope) {
             if let Ok(ack) = umaa::decode(content) {
-                self.remember_ack(ack);
+                self.remember_ack(ack, by_own);
             }
         } else if is_about::<C::ExecutionStatus>(envelope) {
             let status = umaa::decode::<C::ExecutionStatus>(content);
@@ -83,21 +95,20 @@ impl<C: Command, E: Executor<C>, A: Admission> Provider<C, E, A> {
         }
     }
 
-    /// A node that retains for this one may be behind: what is older than what is known says nothing.
-    fn remember_status(&mut self, status: &CommandStatus<C>) {
+    fn remember_status(&mut self, status: &CommandStatus<C>, by_own: bool) {
         if let Some(left) = self.left_of(status.key())
-            && left.state.is_none_or(|(known, _)| status.time_stamp >= known)
+            && left.believes(status.time_stamp, left.state.map(|(known, _)| known), by_own)
         {
             left.state = Some((status.time_stamp, status.command_status));
         }
     }
 
-    fn remember_ack(&mut self, ack: CommandAckReport<C>) {
+    fn remember_ack(&mut self, ack: CommandAckReport<C>, by_own: bool) {
         let consumer = self.guids.service(ack.command.header().source);
         // Of a consumer on the own entity no token is told; what it retains always is.
         let is_here = consumer.is_some_and(|consumer| consumer.entity == self.source.entity);
         if let Some(left) = self.left_of(ack.key())
-            && left.ack.as_ref().is_none_or(|known| ack.time_stamp >= known.time_stamp)
+            && left.believes(ack.time_stamp, left.ack.as_ref().map(|known| known.time_stamp), by_own)
         {
             left.consumer_is_here |= is_here;
             left.ack = Some(ack);
@@ -197,9 +208,10 @@ impl<C: Command, E: Executor<C>, A: Admission> Provider<C, E, A> {
     }
 
     /// What a former life said of commands that nobody knows. Where everybody here has told what there is, nobody executes
-    /// such a command any more, and its status must not say so.
+    /// such a command any more, and its status must not say so. Nor may it where others are not executed because of it.
     pub(super) fn give_up_orphans(&mut self, now: Now, all_is_told: bool, out: &mut Outbox) {
         let Some(wait_ends) = self.past.wait_ends else { return };
+        let fails = all_is_told || !self.executor.awaits_lost_commands();
         let sessions: Vec<Guid> = self.past.left.keys().copied().collect();
         for session in sessions {
             let Some(left) = self.past.left.get_mut(&session) else { continue };
@@ -207,7 +219,7 @@ impl<C: Command, E: Executor<C>, A: Admission> Provider<C, E, A> {
                 let execution_status = left.execution_status;
                 self.past.left.remove(&session);
                 self.dispose_past(session, execution_status, out);
-            } else if all_is_told && left.state.is_some_and(|(_, state)| !state.is_terminal()) {
+            } else if fails && left.state.is_some_and(|(_, state)| !state.is_terminal()) {
                 left.state = Some((now.wall.into(), CommandState::Failed));
                 let text = "its command was gone when its provider started again";
                 self.publish_past(now, session, text, out);

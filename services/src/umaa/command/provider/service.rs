@@ -22,9 +22,9 @@ impl<C: Command, E: Executor<C>, A: Admission> Provider<C, E, A> {
         self.admission.observe(now, input, out);
         self.executor.observe(now, input, out);
         match input {
-            Input::Recovered(envelope) => self.remember(envelope),
+            Input::Recovered(envelope) => self.remember(envelope, true),
             Input::Message(envelope) if is_about::<C>(envelope) => self.command(now, envelope, out),
-            Input::Message(envelope) => self.remember(envelope),
+            Input::Message(envelope) => self.remember(envelope, false),
             Input::Token(source, alive) => self.alive(*source, *alive),
             Input::HistoryComplete(all_is_told) => self.recover(now, *all_is_told, out),
             Input::Shutdown => self.shut_down(now, out),

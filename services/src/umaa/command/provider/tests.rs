@@ -6,7 +6,9 @@ use crate::umaa::tests::asking::{Asking, Handle, Seen};
 use crate::umaa::tests::bus::{Bus, Factory, guids, source};
 use crate::umaa::tests::vector::{VectorCommand, VectorExecutionStatus, provider, steer};
 
+use crate::service::{Action, Input};
 use aldis_envelope::umaa::{CommandState, CommandStatusReason};
+use aldis_envelope::{BootId, Priority, Stamp, Wall};
 use std::sync::Arc;
 
 type VectorConsumer = Consumer<VectorCommand>;
@@ -435,6 +437,39 @@ fn only_what_this_provider_said_itself_counts_as_its_past() {
     sea.run(5);
     assert_eq!(*sea.asked.lock().unwrap(), ["start 90"]);
     assert_eq!(sea.told(), "ISSUED COMMANDED EXECUTING left:2 Completed");
+}
+
+#[test]
+fn the_last_word_of_a_former_life_counts_whatever_its_clock_said() {
+    let writer = steersman();
+    let key = SessionKey { source: guids().of_service(writer), session_id: Guid([3; 16]) };
+    let stamp = |sequence| Stamp {
+        node: writer.entity,
+        boot: BootId(1),
+        sequence,
+        source_time: Wall(0),
+        lifespan_left_ms: None,
+        priority: Priority::Data,
+        skipped: 0,
+        via: Vec::new(),
+    };
+    let said = |sequence, seconds, state, reason| {
+        let time = DateTime::new(seconds, 0).unwrap();
+        let status = CommandStatus::<VectorCommand>::new(time, key, state, reason, Default::default());
+        let message = umaa::put(umaa::label::<CommandStatus<VectorCommand>>(writer).unwrap(), &status);
+        Envelope { message, stamp: stamp(sequence) }
+    };
+    // The clock has been set back in between.
+    let commanded = said(1, 60, CommandState::Commanded, CommandStatusReason::Succeeded);
+    let failed = said(2, 10, CommandState::Failed, CommandStatusReason::Interrupted);
+    let mut provider = provider_of(ProviderSettings::default(), Seen::default())();
+    let mut out = Outbox::new(writer);
+    let now = Now { monotonic: Monotonic::START, wall: Wall(0) };
+    for input in [Input::Recovered(&commanded), Input::Recovered(&failed), Input::HistoryComplete(true)] {
+        provider.handle(now, input, &mut out);
+    }
+    let says = |action: &Action| matches!(action, Action::Send(message) if message.change == Change::Put);
+    assert_eq!(out.drain().filter(says).count(), 0, "it has failed, and does not fail again");
 }
 
 /// A door that a test shuts.
