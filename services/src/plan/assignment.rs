@@ -1,8 +1,8 @@
 //! Assignment: which vehicle does which task in which way and order.
 //!
-//! A greedy plan comes first and gets better with each slice of work. Where all tasks are independent and few, tables
-//! give the best plan; where a process algebra relates them, a tree search does, if its nodes suffice; beyond that a
-//! neighbourhood search does what it can. Every plan says how far from the best it can be at most.
+//! A greedy plan comes first and gets better with each slice of work. Where tasks are few and vehicles do not wait for each
+//! other, tables give the best plan; where they wait, a tree search does, if its nodes suffice; beyond that a neighbourhood search
+//! does what it can. Every plan says how far from the best it can be at most.
 
 mod arborescence;
 mod bound;
@@ -12,11 +12,11 @@ mod file;
 mod infeasible;
 pub mod instance;
 mod neighbourhood;
-mod parallel;
 mod problem;
 mod relax;
 mod request;
 mod schedule;
+mod tables;
 #[cfg(test)]
 mod tests;
 mod tree;
@@ -107,7 +107,8 @@ pub enum AssignError {
 /// What is left of the work.
 enum Work {
     Nothing,
-    Tables,
+    /// Tables, and what comes after them if they do not settle it.
+    Tables(Option<Box<Neighbourhood>>, Option<Box<Tree>>),
     /// A tree search, after some neighbourhood search.
     Search(Option<Box<Neighbourhood>>, Option<Box<Tree>>),
 }
@@ -144,9 +145,10 @@ impl Assigner {
         let mut nodes = 0;
         let near = Neighbourhood::new(&problem, relaxation.clone(), effort.seed, &mut nodes);
         let tree = Tree::new(&problem, relaxation);
-        let work = match parallel::nodes(&problem) {
-            Some(nodes) if nodes <= effort.nodes => Work::Tables,
-            _ => Work::Search(near.clone().map(Box::new), tree.map(Box::new)),
+        let (then, tree) = (near.clone().map(Box::new), tree.map(Box::new));
+        let work = match tables::nodes(&problem) {
+            Some(nodes) if nodes <= effort.nodes => Work::Tables(then, tree),
+            _ => Work::Search(then, tree),
         };
         let bound = problem.value(makespan, total).0;
         let mut assigner =
@@ -161,7 +163,7 @@ impl Assigner {
     pub fn work(&mut self, nodes: u64) -> bool {
         match std::mem::replace(&mut self.work, Work::Nothing) {
             Work::Nothing => return false,
-            Work::Tables => self.tables(),
+            Work::Tables(near, tree) => self.tables(near, tree),
             Work::Search(near, tree) => self.search(near, tree, nodes),
         }
         if matches!(self.work, Work::Nothing) {
@@ -170,11 +172,18 @@ impl Assigner {
         !matches!(self.work, Work::Nothing)
     }
 
-    fn tables(&mut self) {
-        self.nodes += parallel::nodes(&self.problem).unwrap_or(0);
-        self.proven = true;
-        if let Some(routes) = parallel::solve(&self.problem) {
-            self.take(routes);
+    fn tables(&mut self, near: Option<Box<Neighbourhood>>, tree: Option<Box<Tree>>) {
+        self.nodes += tables::nodes(&self.problem).unwrap_or(0);
+        match tables::solve(&self.problem) {
+            Some((routes, (makespan, total))) => {
+                self.bound = self.bound.max(self.problem.value(makespan, total).0);
+                self.proven = schedule(&self.problem, &routes).is_some();
+                self.take(routes);
+            }
+            None => self.proven = true,
+        }
+        if !self.proven {
+            self.work = Work::Search(near, tree);
         }
     }
 
