@@ -22,9 +22,8 @@ const ENTRIES_PER_NODE: u64 = 1024;
 /// The nodes that the tables cost, or none where they do not fit, or where vehicles wait for each other.
 pub(super) fn nodes(problem: &Problem) -> Option<u64> {
     let (groups, atoms) = (problem.groups.len(), problem.atoms.len());
-    let is_once = problem.groups.iter().map(Vec::len).sum::<usize>() == atoms;
     let waits = problem.temporal && problem.has_order();
-    if waits || !is_once || groups > GROUPS_MAX || atoms << groups > TABLE_MAX {
+    if waits || !problem.is_once() || groups > GROUPS_MAX || atoms << groups > TABLE_MAX {
         return None;
     }
     let selections = selections(&problem.parts)?;
