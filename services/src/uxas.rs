@@ -24,6 +24,7 @@ pub mod ground;
 pub mod kinematic;
 pub mod machine;
 pub mod planner;
+pub mod planners;
 pub mod region_state;
 pub mod sensor_manager;
 pub mod task;

@@ -16,15 +16,15 @@ use std::time::Duration;
 
 const BOAT: i64 = 400;
 
-fn id(number: u64) -> EntityId {
+pub(super) fn id(number: u64) -> EntityId {
     EntityId::new(number).unwrap()
 }
 
-fn at(latitude: f64) -> Location3D {
+pub(super) fn at(latitude: f64) -> Location3D {
     Location3D { latitude, longitude: 20.0, ..Location3D::default() }
 }
 
-fn boat() -> Vec<Box<dyn Object>> {
+pub(super) fn boat() -> Vec<Box<dyn Object>> {
     let mut boat = SurfaceVehicleConfiguration::default();
     (boat.id, boat.nominal_speed) = (BOAT, 5.0);
     let mut state = SurfaceVehicleState::default();
@@ -58,7 +58,7 @@ fn shore(number: u64) -> Member {
 }
 
 fn vehicle(may: Vec<aldis_envelope::Source>) -> Member {
-    let config = KinematicConfig { vehicle: BOAT, period: Duration::from_millis(500) };
+    let config = KinematicConfig::of(BOAT, Duration::from_millis(500));
     let core = Core::GuardedKinematic(config, Control::of(id(400), "autopilot"));
     let services = vec![("boat".to_owned(), Kind::Core(core))];
     Member { resource: Some(("autopilot".to_owned(), may)), ..Member::new(id(400), services) }
