@@ -5,6 +5,8 @@
 //! and what it hears is kept.
 
 #[cfg(test)]
+mod control_ends;
+#[cfg(test)]
 mod planner_gone;
 mod rules;
 mod take_over;

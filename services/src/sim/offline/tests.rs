@@ -1,17 +1,23 @@
 //! Whole plans by the core services on a node alone, and what happens where there is none.
 
 use super::{Offline, Played};
+use crate::plan::roads::OneWay;
 use crate::registry::Kind;
 use crate::uxas::Core;
+use crate::uxas::osm::OsmConfig;
 use crate::uxas::validator::failure;
 use aldis_envelope::lmcp::cmasi::{
     AutomationRequest, AutomationResponse, Circle, KeepOutZone, Location3D, MissionCommand, OperatingRegion,
     PointSearchTask,
 };
+use aldis_envelope::lmcp::impact::CordonTask;
 use aldis_envelope::lmcp::uxtask::{TaskAssignmentSummary, TaskPlanOptions};
-use aldis_envelope::lmcp::vehicles::{SurfaceVehicleConfiguration, SurfaceVehicleState};
+use aldis_envelope::lmcp::vehicles::{
+    GroundVehicleConfiguration, GroundVehicleState, SurfaceVehicleConfiguration, SurfaceVehicleState,
+};
 use aldis_envelope::lmcp::{Object, Ref, Text, decode, read_xml};
 use aldis_envelope::{EntityId, Monotonic};
+use bytes::Bytes;
 use std::path::Path;
 use std::time::Duration;
 
@@ -125,6 +131,35 @@ fn the_same_messages_make_the_same_plan_to_the_byte() {
         heard.into_iter().map(|one| (one.descriptor, one.content)).collect::<Vec<_>>()
     };
     assert!(plan() == plan());
+}
+
+#[test]
+fn a_cordon_closes_the_roads_that_lead_out_of_a_town() {
+    let town = Bytes::from_static(include_bytes!("../../uxas/osm/town.osm"));
+    let mut cores = Core::pipeline(false, 0.0);
+    cores.push(Core::Roads(OsmConfig::new(town, OneWay::Respect).unwrap()));
+    let services = cores.into_iter().map(|core| (core.name().to_owned(), Kind::Core(core))).collect();
+    let mut node = Offline::new(EntityId::new(100).unwrap(), services).unwrap();
+    let mut told = Vec::new();
+    for (id, longitude) in (1..=4).zip([19.99, 19.995, 20.005, 20.01]) {
+        let mut car = GroundVehicleConfiguration::default();
+        (car.id, car.nominal_speed) = (id, 10.0);
+        let mut state = GroundVehicleState::default();
+        (state.id, state.location) = (id, at(60.0, longitude));
+        told.extend([Box::new(car) as Box<dyn Object>, Box::new(state)]);
+    }
+    let mut cordon = CordonTask { cordon_location: at(60.0, 20.0), ..CordonTask::default() };
+    (cordon.task_id, cordon.standoff_distance) = (300, 300.0);
+    told.push(Box::new(cordon));
+    let (answer, _, _) = ask(&mut node, told, request(&[1, 2, 3, 4], &[300], "", 0));
+    assert_eq!(failure(&answer), None);
+    let ends = answer.mission_command_list.iter().map(|mission| {
+        let last = mission.get().unwrap().waypoint_list.last().unwrap().get().unwrap().clone();
+        (((last.latitude - 60.0) * 1e4).round() as i64, ((last.longitude - 20.0) * 1e4).round() as i64)
+    });
+    let ends: std::collections::BTreeSet<_> = ends.collect();
+    // 300 m are 0.0027 degrees to the north, and twice as many to the east.
+    assert_eq!(ends, [(-27, 0), (0, -54), (0, 54), (27, 0)].into_iter().collect());
 }
 
 /// The messages of a folder beside the project, requests last; none where it is not there.

@@ -27,10 +27,10 @@ const KNOWN_MAX: usize = 65_536;
 pub(super) type Straight = Result<(Vec<Point>, f64), String>;
 
 /// A region for a vehicle.
-pub(super) struct Region {
+pub(in crate::uxas) struct Region {
     pub(super) vehicle: Vehicle,
-    pub(super) ground: Ground,
-    pub(super) space: FreeSpace,
+    pub(in crate::uxas) ground: Ground,
+    pub(in crate::uxas) space: FreeSpace,
     pub(super) turning: Turning,
     pub(super) compat: bool,
     pub(super) separation_m: f64,
@@ -54,7 +54,7 @@ pub(super) enum Turning {
 ///
 /// # Errors
 /// What is wrong with the region's zones, in words.
-pub(super) fn build(
+pub(in crate::uxas) fn build(
     world: &World,
     region: i64,
     vehicle: Vehicle,

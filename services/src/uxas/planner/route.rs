@@ -2,7 +2,7 @@
 
 use super::region::{RADIUS_MIN_M, Region, in_degrees};
 use crate::plan::free_space::Point;
-use crate::plan::turning::{Piece, Pose, TurningError, words};
+use crate::plan::turning::{Piece, Pose, TurningError, shortest_m};
 use crate::uxas::ground::far;
 use aldis_envelope::lmcp::Ref;
 use aldis_envelope::lmcp::cmasi::{Location3D, Waypoint};
@@ -48,9 +48,7 @@ impl Region {
     fn estimate(&mut self, (start, goal): (Pose, Pose)) -> Result<f64, String> {
         let radius = self.vehicle.turn_radius_m;
         let (points, _) = self.straight(start.at, goal.at).as_ref().map_err(Clone::clone)?;
-        let shortest = |from: Pose, to: Pose| {
-            words(from, to, radius).iter().map(|word| word.length_m).fold(f64::INFINITY, f64::min)
-        };
+        let shortest = |from: Pose, to: Pose| shortest_m(from, to, radius).unwrap_or(f64::INFINITY);
         let heading = |from: Point, to: Point| (to.1 - from.1).atan2(to.0 - from.0);
         let mut pose = start;
         let mut sum = 0.0;
