@@ -28,7 +28,9 @@ impl Chart {
     /// The chart of what a plan is about.
     pub(super) fn new(plan: &Plan) -> Self {
         let mut world = World::default();
-        plan.scenario.all().for_each(|object| drop(world.take(object)));
+        for object in plan.scenario.all() {
+            world.take(object);
+        }
         let zones = world.zones.values().filter_map(|zone| zone.get::<AbstractZone>());
         let places: Vec<Location3D> = zones.flat_map(|zone| places(&zone.boundary)).collect();
         let extreme = |of: fn(&Location3D) -> f64, pick: fn(f64, f64) -> f64| {

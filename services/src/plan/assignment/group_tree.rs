@@ -9,6 +9,7 @@ use super::relax::Relaxation;
 use super::schedule::Routes;
 use super::tree::Search;
 use crate::plan::algebra::{Algebra, Expression, Operator};
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 /// The most groups that a state holds, and of which a search is of use.
@@ -29,12 +30,15 @@ struct State {
     last: (u8, u8),
 }
 
+/// What was done, and the last group of each vehicle.
+type Known = (u128, Vec<Option<u8>>);
+
 /// A search that can be stopped after any number of nodes and go on later.
 pub(super) struct GroupTree {
     algebra: Algebra<u128>,
     relaxation: Relaxation,
     stack: Vec<State>,
-    seen: BTreeMap<(u128, Vec<Option<u8>>), Vec<Vec<i64>>>,
+    seen: BTreeMap<Known, Vec<Vec<i64>>>,
     remembered: usize,
 }
 
@@ -130,7 +134,7 @@ impl Search for GroupTree {
                 used += children.len() as u64;
                 children.retain(|child| child.bound < *best);
                 // The best is searched first: it is taken from the end.
-                children.sort_by(|a, b| (b.bound, b.last).cmp(&(a.bound, a.last)));
+                children.sort_by_key(|child| Reverse((child.bound, child.last)));
                 self.stack.append(&mut children);
             } else {
                 let ends = earliest(&state);

@@ -44,6 +44,14 @@ fn metres(a: (f64, f64), b: (f64, f64)) -> f64 {
     Plane::new(place(a)).distance_m(place(a), place(b))
 }
 
+/// The zone of the town, around a place.
+fn zone(latitude: f64, longitude: f64) -> KeepOutZone {
+    let around = Circle { center_point: at(latitude, longitude), radius: 100.0, ..Circle::default() };
+    let mut zone = KeepOutZone::default();
+    (zone.zone_id, zone.boundary) = (5, Ref::new(around));
+    zone
+}
+
 /// A planner that knows a car, a boat, and a region in which a zone lies on the road to the west.
 fn town() -> Osm {
     let mut osm = Osm::new(OsmConfig::new(Bytes::from_static(TOWN), OneWay::Respect).unwrap());
@@ -51,9 +59,7 @@ fn town() -> Osm {
     (car.id, car.nominal_speed) = (CAR, 10.0);
     let mut boat = SurfaceVehicleConfiguration::default();
     (boat.id, boat.nominal_speed) = (BOAT, 10.0);
-    let mut zone = KeepOutZone::default();
-    zone.zone_id = 5;
-    zone.boundary = Ref::new(Circle { center_point: at(60.005, 20.0), radius: 100.0, ..Circle::default() });
+    let zone = zone(60.005, 20.0);
     let region = OperatingRegion { id: 9, keep_out_areas: vec![5], ..OperatingRegion::default() };
     for object in [&car as &dyn Object, &boat, &zone, &region] {
         assert!(hear(&mut osm, object).is_empty());
