@@ -18,6 +18,7 @@ mod locator;
 mod read;
 mod recorder;
 mod resource;
+mod roads;
 mod schema;
 mod send_messages;
 mod service;

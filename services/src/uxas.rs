@@ -23,7 +23,9 @@ pub mod coordinator;
 pub mod ground;
 pub mod kinematic;
 pub mod machine;
+pub mod osm;
 pub mod planner;
+pub mod planners;
 pub mod region_state;
 pub mod sensor_manager;
 pub mod task;
@@ -48,6 +50,8 @@ pub enum Core {
     Tasks(task_manager::TaskManagerConfig),
     /// Finds ways.
     Planner(planner::PlannerConfig),
+    /// Finds ways along roads.
+    Roads(osm::OsmConfig),
     /// Collects ways.
     Aggregator(aggregator::AggregatorConfig),
     /// Assigns tasks.
@@ -75,6 +79,7 @@ impl Core {
             Self::Validator(config) => Box::new(Hosted::new(validator::Validator::new(*config))),
             Self::Tasks(config) => Box::new(Hosted::new(task_manager::TaskManager::new(config.clone()))),
             Self::Planner(config) => Box::new(Hosted::new(planner::Planner::new(config.clone()))),
+            Self::Roads(config) => Box::new(Hosted::new(osm::Osm::new(config.clone()))),
             Self::Aggregator(config) => Box::new(Hosted::new(aggregator::Aggregator::new(*config))),
             Self::Tree(config) => Box::new(Hosted::new(tree::Tree::new(*config))),
             Self::Builder(config) => Box::new(Hosted::new(builder::Builder::new(*config))),
@@ -97,6 +102,7 @@ impl Core {
             Self::Validator(_) => "AutomationRequestValidator",
             Self::Tasks(_) => "TaskManager",
             Self::Planner(_) => "RoutePlannerVisibility",
+            Self::Roads(_) => "OsmPlanner",
             Self::Aggregator(_) => "RouteAggregator",
             Self::Tree(_) => "AssignmentTreeBranchBound",
             Self::Builder(_) => "PlanBuilder",

@@ -5,6 +5,8 @@ mod control;
 mod crashing;
 mod fleet;
 mod linked;
+mod map;
+mod missions;
 mod screen;
 mod shore;
 
@@ -15,6 +17,8 @@ use crate::config::{Level, Log, LogFormat};
 use crate::runtime::Control;
 use board::{Board, SILENCED};
 use fleet::Fleet;
+use map::Chart;
+use missions::Plan;
 use serde_json::json;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -29,13 +33,13 @@ const STATUS_WITHIN: Duration = Duration::from_secs(10);
 
 /// A shore station and three boats in one process, each with a Zenoh session of its own.
 ///
-/// The boats move along simple tracks and tell where they are (LMCP) and how they do (UMAA HealthReport); shore calls
-/// them each second; boat 403 is silenced for a while and comes back. A planner and an operator on shore contend for the
+/// Shore plans the harbour scenario with the core services of UxAS, asks each boat's arbiter for control (UMAA ResourceAllocation),
+/// and the boats do their missions; they tell where they are (LMCP) and how they do (UMAA HealthReport). Shore calls them each second; boat 403 is silenced for a while and comes back. A planner and an operator on shore contend for the
 /// autopilot of boat 401 (UMAA ResourceAllocation): the operator takes over by priority, the planner's time runs out. The
 /// arbiter of boat 402 crashes now and then and goes on with the command that it was executing.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  aldis demo\n  aldis demo --headless --seconds 15 --json\n  aldis demo --headless --seconds 60 --link L1 --json"
+    after_help = "Examples:\n  aldis demo\n  aldis demo --headless --seconds 15 --json\n  aldis demo --headless --seconds 60 --link L1 --json\n  aldis demo --headless --missions --link L1 --json"
 )]
 pub(crate) struct Demo {
     /// No table: only the result at the end.
@@ -48,6 +52,12 @@ pub(crate) struct Demo {
     /// 403 is cut off in place of being silenced.
     #[arg(long, value_name = "PROFILE")]
     link: Option<String>,
+    /// Run until the boats have completed every task of their missions; 900 s at the longest, unless `--seconds` says otherwise.
+    #[arg(long)]
+    missions: bool,
+    /// How many seconds the boats move in one of the clock.
+    #[arg(long, default_value_t = 10.0, value_name = "FACTOR")]
+    pace: f64,
     /// The result as one JSON object, the last line.
     #[arg(long)]
     json: bool,
@@ -56,20 +66,22 @@ pub(crate) struct Demo {
 impl Demo {
     pub(crate) fn run(self) -> Result<(), Failure> {
         telemetry::start(&Log { level: Level::Error, format: LogFormat::Text });
-        let seconds = self.seconds.or(self.headless.then_some(15)).map(Duration::from_secs);
+        let at_most = if self.missions { Some(900) } else { self.headless.then_some(15) };
+        let seconds = self.seconds.or(at_most).map(Duration::from_secs);
+        let plan = Plan::new(self.pace)?;
         let board = Arc::new(Mutex::new(Board::default()));
         let link = self.link.as_deref().map(super::link::profile).transpose()?;
-        let fleet = Fleet::start(&board, link.as_ref())?;
+        let fleet = Fleet::start(&board, link.as_ref(), &plan)?;
         let (stop, stopped) = mpsc::unbounded_channel();
         super::run::watch_signals(move || {
             let _ = stop.send(Control::Shutdown);
         })?;
-        let ran = self.play(&fleet, &board, seconds, stopped);
+        let ran = self.play(&fleet, &board, (seconds, &plan), stopped);
         linked::drain(&board);
         let statuses = fleet.statuses(if link.is_some() { linked::STATUS_WITHIN } else { STATUS_WITHIN })?;
         fleet.leave()?;
         let board = board.lock().unwrap_or_else(PoisonError::into_inner);
-        self.report(&board.result(&statuses, ran))
+        self.report(&board.result(&statuses, ran), &plan)
     }
 
     /// Lets the demo run: draws the table, silences a boat and lets it come back. Returns how long it ran.
@@ -77,15 +89,18 @@ impl Demo {
         &self,
         fleet: &Fleet,
         board: &Arc<Mutex<Board>>,
-        seconds: Option<Duration>,
+        (seconds, plan): (Option<Duration>, &Plan),
         mut stopped: mpsc::UnboundedReceiver<Control>,
     ) -> Duration {
         let start = Instant::now();
-        let turn = seconds.unwrap_or(TURN);
+        let turn = seconds.filter(|_| !self.missions).unwrap_or(TURN);
+        let chart = Chart::new(plan);
         let mut silent = false;
         loop {
             let ran = start.elapsed();
-            if seconds.is_some_and(|seconds| ran >= seconds) || stopped.try_recv().is_ok() {
+            let is_done =
+                || self.missions && board.lock().is_ok_and(|board| board.missions.is_complete(plan));
+            if seconds.is_some_and(|seconds| ran >= seconds) || is_done() || stopped.try_recv().is_ok() {
                 fleet.silence(false);
                 return ran;
             }
@@ -98,7 +113,7 @@ impl Demo {
             let mut board = board.lock().unwrap_or_else(PoisonError::into_inner);
             board.silenced = silent.then_some(SILENCED);
             if !self.headless {
-                screen::draw(&mut board, ran);
+                screen::draw(&mut board, ran, &chart);
             }
             drop(board);
             let left = seconds.map_or(DRAW_EVERY, |seconds| seconds.saturating_sub(ran));
@@ -110,7 +125,7 @@ impl Demo {
         }
     }
 
-    fn report(&self, result: &board::Outcome) -> Result<(), Failure> {
+    fn report(&self, result: &board::Outcome, plan: &Plan) -> Result<(), Failure> {
         let mut object = json!({
             "entities": result.entities,
             "envelopes_delivered": result.delivered,
@@ -128,6 +143,7 @@ impl Demo {
                 "crashes": result.crashes, "commands_recovered": result.recovery.recovered,
                 "ended_otherwise": result.recovery.otherwise,
             },
+            "missions": result.missions.object(plan),
             "silenced": SILENCED,
             "seconds": result.ran.as_secs_f64().round(),
         });
@@ -144,6 +160,9 @@ impl Demo {
             return Err(Failure::Failed(format!("{} envelopes were lost", result.lost)));
         }
         result.linked.judge()?;
+        if self.missions && !result.missions.is_complete(plan) {
+            return Err(Failure::Failed(result.missions.incomplete(plan)));
+        }
         // On a bad link some calls come back too late.
         if result.calls_failed_elsewhere > 0 && self.link.is_none() {
             let count = result.calls_failed_elsewhere;

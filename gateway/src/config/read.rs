@@ -10,6 +10,7 @@ use super::check;
 use super::cure::{nearest, split};
 use super::error::{ConfigError, Fault};
 use super::recorder::{EntityStates, Recorder};
+use super::roads::OsmPlanner;
 use super::send_messages::SendMessages;
 use super::service::{Service, ServiceManager, Track, named_service};
 use miette::NamedSource;
@@ -45,15 +46,18 @@ pub(super) fn read_files(
     let source = Arc::new(NamedSource::new(file, text.to_owned()));
     let mut mistakes = Vec::new();
     for (index, service) in config.services.iter_mut().enumerate() {
-        match service {
-            Service::SendMessages(send) => {
-                if let Err(fault) = send.read(base) {
-                    let fault = fault.below(&format!("service.{index}"));
-                    mistakes.push(located(&source, text, Mistake::Fault(fault)));
-                }
+        let read = match service {
+            Service::SendMessages(send) => send.read(base),
+            Service::OsmPlanner(roads) => roads.read(base),
+            Service::Recorder(recorder) => {
+                recorder.stand(base);
+                Ok(())
             }
-            Service::Recorder(recorder) => recorder.stand(base),
-            _ => {}
+            _ => Ok(()),
+        };
+        if let Err(fault) = read {
+            let fault = fault.below(&format!("service.{index}"));
+            mistakes.push(located(&source, text, Mistake::Fault(fault)));
         }
     }
     for (index, bridge) in config.bridges.iter_mut().enumerate() {
@@ -142,6 +146,10 @@ fn service(element: Element<'_>, index: usize) -> Result<Service, Mistake> {
         "send-messages" => {
             let send = typed::<SendMessages>(table)?.check();
             Ok(Service::SendMessages(send.map_err(|f| Mistake::Fault(f.below(&path)))?))
+        }
+        "osm-planner" => {
+            let roads = typed::<OsmPlanner>(table)?.check();
+            Ok(Service::OsmPlanner(roads.map_err(|f| Mistake::Fault(f.below(&path)))?))
         }
         "recorder" => {
             let recorder = typed::<Recorder>(table)?.check();

@@ -3,6 +3,7 @@
 use super::bridge::in_range;
 use super::error::Fault;
 use super::recorder::{EntityStates, Recorder};
+use super::roads::OsmPlanner;
 use super::schema;
 use super::send_messages::SendMessages;
 use super::uxas::{self, CoreTable};
@@ -28,6 +29,8 @@ pub(crate) enum Service {
     SensorManager(uxas::SensorManager),
     /// Finds ways around zones.
     RoutePlannerVisibility(uxas::RoutePlannerVisibility),
+    /// Finds ways along roads.
+    OsmPlanner(OsmPlanner),
     /// Collects routes, and the costs between tasks.
     RouteAggregator(uxas::RouteAggregator),
     /// Assigns tasks to vehicles.
@@ -62,6 +65,7 @@ impl Service {
         "task-manager",
         "sensor-manager",
         "route-planner-visibility",
+        "osm-planner",
         "route-aggregator",
         "assignment-tree-branch-bound",
         "plan-builder",
@@ -74,7 +78,7 @@ impl Service {
     pub(crate) fn core(&self) -> Option<&dyn CoreTable> {
         Some(match self {
             Self::Track(_) | Self::SendMessages(_) | Self::ServiceManager(_) => return None,
-            Self::Recorder(_) | Self::EntityStates(_) => return None,
+            Self::Recorder(_) | Self::EntityStates(_) | Self::OsmPlanner(_) => return None,
             Self::AutomationRequestValidator(table) => table,
             Self::TaskManager(table) => table,
             Self::SensorManager(table) => table,
@@ -95,6 +99,7 @@ impl Service {
             Self::SendMessages(send) => send.service,
             Self::ServiceManager(manager) => manager.service,
             Self::Recorder(recorder) => recorder.service,
+            Self::OsmPlanner(roads) => roads.service,
             Self::EntityStates(states) => states.service,
             core => core.core().and_then(CoreTable::service).unwrap_or(ServiceId::NODE),
         }
@@ -104,9 +109,8 @@ impl Service {
     pub(crate) fn entity(&self) -> Option<EntityId> {
         match self {
             Self::Track(track) => track.entity,
-            Self::SendMessages(_) | Self::ServiceManager(_) | Self::Recorder(_) | Self::EntityStates(_) => {
-                None
-            }
+            Self::SendMessages(_) | Self::ServiceManager(_) => None,
+            Self::Recorder(_) | Self::EntityStates(_) | Self::OsmPlanner(_) => None,
             core => core.core().and_then(CoreTable::entity),
         }
     }

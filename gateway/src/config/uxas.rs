@@ -235,11 +235,14 @@ tables! {
         vehicle: Option<i64> = None,
         /// How often it tells its state, in milliseconds; at least 10. Default: 1000.
         period_ms: u32 = 1000,
+        /// How many seconds it moves in one of the clock, at most 1000. Default: 1.
+        pace: f64 = 1.0,
         /// The resource of its entity that the sender of a mission has to control. Default: none, it follows every mission.
         resource: Option<PlainName> = None,
     } => |table, entity| guarded(table.resource.as_ref(), KinematicConfig {
         vehicle: table.vehicle.unwrap_or(number(entity)),
         period: Duration::from_millis(u64::from(table.period_ms)),
+        pace: table.pace,
     }, entity);
 }
 

@@ -228,7 +228,9 @@ fn maker(fleet: &Fleet, own: EntityId, guids: &Guids) -> Maker {
         let id = source.service.get();
         let service = config::uxas_file::service(&create.xml_configuration, own.get(), id)?;
         match &service {
-            config::Service::SendMessages(_) => Err("files are read at the start of a node alone".to_owned()),
+            config::Service::SendMessages(_) | config::Service::OsmPlanner(_) => {
+                Err("files are read at the start of a node alone".to_owned())
+            }
             service => Ok(configured(&fleet, own, service, &guids)),
         }
     })
@@ -256,6 +258,12 @@ fn configured(fleet: &Fleet, own: EntityId, service: &config::Service, guids: &G
                 write: crate::recording::writer(&recorder.directory),
             });
             registry::service(source, "recorder", kind, guids)
+        }
+        config::Service::OsmPlanner(roads) => {
+            // A configuration without its files was refused.
+            let core = roads.roads.clone().map(Core::Roads);
+            let name = core.as_ref().map_or("none", Core::name);
+            registry::service(source, name, core.map_or(Kind::Node, Kind::Core), guids)
         }
         config::Service::EntityStates(_) => registry::service(source, "entity-states", Kind::Entities, guids),
         core => {

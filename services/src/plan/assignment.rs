@@ -1,22 +1,23 @@
 //! Assignment: which vehicle does which task in which way and order.
 //!
-//! A greedy plan comes first and gets better with each slice of work. Where all tasks are independent and few, tables
-//! give the best plan; where a process algebra relates them, a tree search does, if its nodes suffice; beyond that a
-//! neighbourhood search does what it can. Every plan says how far from the best it can be at most.
+//! A greedy plan comes first and gets better with each slice of work. Where tasks are few and vehicles do not wait for each
+//! other, tables give the best plan; where they wait, a tree search does, if its nodes suffice; beyond that a neighbourhood search
+//! does what it can. Every plan says how far from the best it can be at most.
 
 mod arborescence;
 mod bound;
 mod evaluate;
 mod exhaustive;
 mod file;
+mod group_tree;
 mod infeasible;
 pub mod instance;
 mod neighbourhood;
-mod parallel;
 mod problem;
 mod relax;
 mod request;
 mod schedule;
+mod tables;
 #[cfg(test)]
 mod tests;
 mod tree;
@@ -27,11 +28,12 @@ pub use file::{OptionRow, RequestFile, WayRow};
 pub use infeasible::{Cause, Infeasible};
 pub use request::{Objective, Precedence, Request, RequestError, TIME_MS_MAX, Task, TaskOption, Travel};
 
+use group_tree::GroupTree;
 use neighbourhood::Neighbourhood;
 use problem::{NEVER, Problem};
 use relax::Relaxation;
 use schedule::{Routes, schedule};
-use tree::Tree;
+use tree::{Search, Tree};
 
 /// How much work a plan may cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,9 +109,10 @@ pub enum AssignError {
 /// What is left of the work.
 enum Work {
     Nothing,
-    Tables,
+    /// Tables, and what comes after them if they do not settle it.
+    Tables(Option<Box<Neighbourhood>>, Option<Box<dyn Search>>),
     /// A tree search, after some neighbourhood search.
-    Search(Option<Box<Neighbourhood>>, Option<Box<Tree>>),
+    Search(Option<Box<Neighbourhood>>, Option<Box<dyn Search>>),
 }
 
 /// Work on a request, done in slices.
@@ -123,6 +126,9 @@ pub struct Assigner {
     nodes: u64,
     proven: bool,
 }
+
+/// The most groups of which a tree search sees all sooner than a neighbourhood search is of use.
+const TINY: usize = 8;
 
 /// The most groups of which a tree search is expected to see all.
 const SMALL: usize = 16;
@@ -143,10 +149,15 @@ impl Assigner {
         let (makespan, total) = relaxation.bound(&problem.parts, &idle, &|_| false);
         let mut nodes = 0;
         let near = Neighbourhood::new(&problem, relaxation.clone(), effort.seed, &mut nodes);
-        let tree = Tree::new(&problem, relaxation);
-        let work = match parallel::nodes(&problem) {
-            Some(nodes) if nodes <= effort.nodes => Work::Tables,
-            _ => Work::Search(near.clone().map(Box::new), tree.map(Box::new)),
+        let groups = GroupTree::new(&problem, relaxation.clone());
+        let tree: Option<Box<dyn Search>> = match groups {
+            Some(tree) => Some(Box::new(tree)),
+            None => Tree::new(&problem, relaxation).map(|tree| Box::new(tree) as Box<dyn Search>),
+        };
+        let then = near.clone().map(Box::new);
+        let work = match tables::nodes(&problem) {
+            Some(nodes) if nodes <= effort.nodes => Work::Tables(then, tree),
+            _ => Work::Search(then, tree),
         };
         let bound = problem.value(makespan, total).0;
         let mut assigner =
@@ -161,7 +172,7 @@ impl Assigner {
     pub fn work(&mut self, nodes: u64) -> bool {
         match std::mem::replace(&mut self.work, Work::Nothing) {
             Work::Nothing => return false,
-            Work::Tables => self.tables(),
+            Work::Tables(near, tree) => self.tables(near, tree),
             Work::Search(near, tree) => self.search(near, tree, nodes),
         }
         if matches!(self.work, Work::Nothing) {
@@ -170,15 +181,22 @@ impl Assigner {
         !matches!(self.work, Work::Nothing)
     }
 
-    fn tables(&mut self) {
-        self.nodes += parallel::nodes(&self.problem).unwrap_or(0);
-        self.proven = true;
-        if let Some(routes) = parallel::solve(&self.problem) {
-            self.take(routes);
+    fn tables(&mut self, near: Option<Box<Neighbourhood>>, tree: Option<Box<dyn Search>>) {
+        self.nodes += tables::nodes(&self.problem).unwrap_or(0);
+        match tables::solve(&self.problem) {
+            Some((routes, (makespan, total))) => {
+                self.bound = self.bound.max(self.problem.value(makespan, total).0);
+                self.proven = schedule(&self.problem, &routes).is_some();
+                self.take(routes);
+            }
+            None => self.proven = true,
+        }
+        if !self.proven {
+            self.work = Work::Search(near, tree);
         }
     }
 
-    fn search(&mut self, near: Option<Box<Neighbourhood>>, tree: Option<Box<Tree>>, nodes: u64) {
+    fn search(&mut self, near: Option<Box<Neighbourhood>>, tree: Option<Box<dyn Search>>, nodes: u64) {
         let all = self.before_tree(tree.is_some());
         let (mut near, mut tree, mut left) = (near, tree, nodes.max(1));
         if let Some(search) = near.as_mut().filter(|_| self.nodes < all) {
@@ -214,6 +232,7 @@ impl Assigner {
     fn before_tree(&self, tree: bool) -> u64 {
         let (groups, all) = (self.problem.groups.len(), self.effort.nodes);
         match tree {
+            true if groups <= TINY => 0,
             true if groups <= SMALL => (200 * groups as u64).min(all / 5),
             true => all / 5 * 4,
             false => all,

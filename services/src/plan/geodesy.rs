@@ -57,13 +57,18 @@ impl Plane {
         self.geodesic.inverse(from.latitude_deg, from.longitude_deg, to.latitude_deg, to.longitude_deg)
     }
 
-    /// The direction on the plane, in radians from north to east, of a heading in degrees at a place.
-    pub fn direction_rad(&self, place: Place, heading_deg: f64) -> f64 {
-        let ahead: (f64, f64) =
-            self.geodesic.direct(place.latitude_deg, place.longitude_deg, heading_deg, 1.0);
-        let ahead = self.to_plane(Place { latitude_deg: ahead.0, longitude_deg: ahead.1 });
-        let here = self.to_plane(place);
-        (ahead.1 - here.1).atan2(ahead.0 - here.0)
+    /// Metres to the north and to the east, and the direction on the plane, in radians from north to east, of a heading in degrees
+    /// at the place.
+    pub fn headed(&self, place: Place, heading_deg: f64) -> ((f64, f64), f64) {
+        let (from, to) = (self.origin, place);
+        let (metres, azimuth, onwards, reduced, _): (f64, f64, f64, f64, f64) =
+            self.geodesic.inverse(from.latitude_deg, from.longitude_deg, to.latitude_deg, to.longitude_deg);
+        let azimuth = azimuth.to_radians();
+        let (sine, cosine) = azimuth.sin_cos();
+        // Away from the origin the plane is true; across, it stretches by the length over the reduced length.
+        let stretch = if reduced > 0.0 { metres / reduced } else { 1.0 };
+        let (across, away) = (heading_deg - onwards).to_radians().sin_cos();
+        ((metres * cosine, metres * sine), azimuth + (across * stretch).atan2(away))
     }
 }
 
@@ -93,6 +98,25 @@ mod tests {
         assert!((plane.distance_m(from, to) - 11_160.0).abs() < 5.0);
         let far = plane.to_plane(to);
         assert!((far.0.hypot(far.1) - plane.distance_m(from, to)).abs() < 1e-6);
-        assert!((plane.direction_rad(to, 90.0) - std::f64::consts::FRAC_PI_2).abs() < 0.004);
+        assert!((plane.headed(to, 90.0).1 - std::f64::consts::FRAC_PI_2).abs() < 0.004);
+    }
+
+    #[test]
+    fn a_heading_is_where_a_step_into_it_leads() {
+        let plane = Plane::new(Place { latitude_deg: 60.0, longitude_deg: 179.9 });
+        let places = [(0.0, 0.0), (12_000.0, 30_000.0), (-500.0, -40_000.0), (300_000.0, 200_000.0)];
+        for (at, heading_deg) in
+            places.into_iter().flat_map(|at| [0.0, 77.0, 200.0, 359.0].map(|to| (at, to)))
+        {
+            let place = plane.to_place(at);
+            let (latitude_deg, longitude_deg): (f64, f64) =
+                plane.geodesic.direct(place.latitude_deg, place.longitude_deg, heading_deg, 1.0);
+            let ahead = plane.to_plane(Place { latitude_deg, longitude_deg });
+            let (here, direction) = plane.headed(place, heading_deg);
+            let step = (ahead.1 - here.1).atan2(ahead.0 - here.0);
+            let apart = (direction - step + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU);
+            assert!((apart - std::f64::consts::PI).abs() < 1e-6, "{at:?} {heading_deg}: {direction} {step}");
+            assert!((here.0 - at.0).hypot(here.1 - at.1) < 1e-6);
+        }
     }
 }

@@ -154,12 +154,12 @@ impl RouteFile {
         let (from, to) = (plane.to_plane(origin), plane.to_plane(goal));
         let pieces = match (self.turn_radius_m()?, self.start.heading, self.goal.heading) {
             (Some(radius), Some(first), Some(last)) => {
-                let pose = |at: Point, place: Place, heading: f64| Pose {
-                    at,
-                    heading_rad: plane.direction_rad(place, heading),
+                let pose = |place: Place, heading: f64| {
+                    let (at, heading_rad) = plane.headed(place, heading);
+                    Pose { at, heading_rad }
                 };
                 let space = TurningSpace::new(&zones, &conditions, radius)?;
-                space.route(pose(from, origin, first), pose(to, goal, last)).map(|route| route.pieces)
+                space.route(pose(origin, first), pose(goal, last)).map(|route| route.pieces)
             }
             _ => {
                 let route = FreeSpace::new(&zones, &conditions)?.route(from, to);

@@ -10,7 +10,7 @@ mod escape;
 #[cfg(test)]
 mod tests;
 
-pub use dubins::{Piece, Pose, Word, words};
+pub use dubins::{Piece, Pose, Word, shortest_m, words};
 
 use crate::plan::free_space::{Conditions, FreeSpace, Point, RouteError, SpaceError, Zone};
 

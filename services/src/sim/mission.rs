@@ -4,6 +4,10 @@
 //! commands and statuses of ResourceAllocation. Each node has a player, as [`super::offline`] has: messages are played on it,
 //! and what it hears is kept.
 
+#[cfg(test)]
+mod control_ends;
+#[cfg(test)]
+mod planner_gone;
 mod rules;
 mod take_over;
 #[cfg(test)]

@@ -194,4 +194,6 @@ impl Offline {
 }
 
 #[cfg(test)]
+mod failures;
+#[cfg(test)]
 mod tests;

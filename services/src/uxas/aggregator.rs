@@ -21,21 +21,22 @@ mod needed;
 mod tests;
 
 use super::ground::Ground;
-use super::machine::{FAILED_KEY, Heard, Machine, Post, REQUEST_KEY};
+use super::machine::{FAILED_KEY, Heard, Machine, Post, REQUEST_KEY, pair};
+use super::planners::{self, Planners};
 use super::vehicle::{Medium, Vehicle};
 use super::world::World;
-use aldis_envelope::Source;
 use aldis_envelope::lmcp::cmasi::{
     EntityConfiguration, EntityState, Location3D, RemoveEntities, ServiceStatus, ServiceStatusType,
 };
 use aldis_envelope::lmcp::route::{
-    RoutePlan, RoutePlanRequest, RoutePlanResponse, RouteRequest, RouteResponse,
+    RouteConstraints, RoutePlan, RoutePlanRequest, RoutePlanResponse, RouteRequest, RouteResponse,
 };
 use aldis_envelope::lmcp::uxtask::{TaskPlanOptions, UniqueAutomationRequest, UniqueAutomationResponse};
 use aldis_envelope::lmcp::{Ref, Struct, TypeInfo};
+use aldis_envelope::{Monotonic, Source};
 use collect::Collection;
 pub(super) use collect::led;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// How many requests may be under way; the oldest is dropped for a newer one.
 const REQUESTS_MAX: usize = 256;
@@ -68,8 +69,9 @@ enum Waits {
 
 /// A `RouteRequest` that is pending.
 struct Gathering {
-    request_id: i64,
-    open: BTreeSet<i64>,
+    request: RouteRequest,
+    /// What is asked: the vehicle of each number.
+    open: BTreeMap<i64, i64>,
     routes: BTreeMap<i64, RoutePlanResponse>,
 }
 
@@ -82,8 +84,7 @@ pub struct Aggregator {
     asked: BTreeMap<i64, (Waits, &'static str)>,
     gatherings: BTreeMap<i64, Gathering>,
     collections: BTreeMap<i64, Collection>,
-    /// Who answers a mailbox.
-    planners: BTreeMap<&'static str, Source>,
+    planners: Planners,
 }
 
 impl Aggregator {
@@ -96,7 +97,7 @@ impl Aggregator {
             asked: BTreeMap::new(),
             gatherings: BTreeMap::new(),
             collections: BTreeMap::new(),
-            planners: BTreeMap::new(),
+            planners: Planners::default(),
         }
     }
 
@@ -123,6 +124,7 @@ impl Aggregator {
         if let Some(vehicle) = vehicle.filter(|_| self.config.fast_plan && medium == Medium::Ground) {
             return (self.last, Some(straight(&request, &vehicle, self.config.compat_cost)));
         }
+        self.planners.asked(medium.mailbox(), post.now().monotonic);
         self.asked.insert(self.last, (waits, medium.mailbox()));
         post.mail(medium.mailbox(), &request);
         (self.last, None)
@@ -136,7 +138,7 @@ impl Aggregator {
         self.last += 1;
         let own = self.last;
         let mut gathering =
-            Gathering { request_id: request.request_id, open: BTreeSet::new(), routes: BTreeMap::new() };
+            Gathering { request: request.clone(), open: BTreeMap::new(), routes: BTreeMap::new() };
         for vehicle_id in vehicles {
             let asked = RoutePlanRequest {
                 request_id: 0,
@@ -148,12 +150,12 @@ impl Aggregator {
             };
             match self.ask(Waits::Routes(own), asked, post) {
                 (number, Some(response)) => drop(gathering.routes.insert(number, response)),
-                (number, None) => drop(gathering.open.insert(number)),
+                (number, None) => drop(gathering.open.insert(number, vehicle_id)),
             }
         }
         while self.gatherings.len() >= REQUESTS_MAX {
             if let Some((_, old)) = self.gatherings.pop_first() {
-                self.asked.retain(|number, _| !old.open.contains(number));
+                self.asked.retain(|number, _| !old.open.contains_key(number));
             }
         }
         self.gatherings.insert(own, gathering);
@@ -165,23 +167,50 @@ impl Aggregator {
             && let Some(gathering) = self.gatherings.remove(&own)
         {
             let routes = gathering.routes.into_values().map(Ref::new).collect();
-            post.broadcast(&RouteResponse { response_id: gathering.request_id, routes });
+            post.broadcast(&RouteResponse { response_id: gathering.request.request_id, routes });
         }
     }
 
     fn response(&mut self, response: &RoutePlanResponse, from: Source, post: &mut Post<'_>) {
         let Some((waits, mailbox)) = self.asked.remove(&response.response_id) else { return };
-        self.planners.insert(mailbox, from);
+        self.planners.answered(mailbox, from);
         match waits {
             Waits::Routes(own) => {
                 if let Some(gathering) = self.gatherings.get_mut(&own)
-                    && gathering.open.remove(&response.response_id)
+                    && gathering.open.remove(&response.response_id).is_some()
                 {
                     gathering.routes.insert(response.response_id, response.clone());
                 }
                 self.gathered(own, post);
             }
             Waits::Collection(request) => self.collected(request, response, post),
+        }
+    }
+
+    /// Nobody answers a mailbox: what waits for it ends, with the cause.
+    fn unanswered(&mut self, mailbox: &'static str, planner: Source, post: &mut Post<'_>) {
+        let why = planners::cause(mailbox, planner);
+        let waiting = self.asked.iter().filter(|(_, (_, to))| *to == mailbox);
+        let waiting: Vec<_> = waiting.map(|(&number, (waits, _))| (number, *waits)).collect();
+        for (number, waits) in waiting {
+            match waits {
+                // One that has several vehicles fails once.
+                Waits::Collection(request) if self.asked.contains_key(&number) => {
+                    self.forget(request);
+                    post.failed(request, &why);
+                }
+                Waits::Collection(_) => {}
+                Waits::Routes(own) => {
+                    self.asked.remove(&number);
+                    if let Some(gathering) = self.gatherings.get_mut(&own)
+                        && let Some(vehicle) = gathering.open.remove(&number)
+                    {
+                        let none = unrouted(&gathering.request, vehicle, &why);
+                        gathering.routes.insert(number, none);
+                    }
+                    self.gathered(own, post);
+                }
+            }
         }
     }
 
@@ -203,9 +232,24 @@ impl Aggregator {
     }
 }
 
+/// What is told of a vehicle's routes where nobody finds any.
+fn unrouted(request: &RouteRequest, vehicle_id: i64, why: &str) -> RoutePlanResponse {
+    let route = |asked: &RouteConstraints| {
+        let route_error = vec![pair("RouteAggregator", why)];
+        Ref::new(RoutePlan { route_id: asked.route_id, waypoints: Vec::new(), route_cost: -1, route_error })
+    };
+    RoutePlanResponse {
+        response_id: request.request_id,
+        associated_task_id: request.associated_task_id,
+        vehicle_id,
+        operating_region: request.operating_region,
+        route_responses: request.route_requests.iter().filter_map(|asked| asked.get()).map(route).collect(),
+    }
+}
+
 /// Straight ways of a vehicle, without any zone.
 fn straight(request: &RoutePlanRequest, vehicle: &Vehicle, compat: bool) -> RoutePlanResponse {
-    let route = |asked: &aldis_envelope::lmcp::route::RouteConstraints| {
+    let route = |asked: &RouteConstraints| {
         let nowhere = Location3D::default();
         let (from, to) =
             (asked.start_location.get().unwrap_or(&nowhere), asked.end_location.get().unwrap_or(&nowhere));
@@ -265,25 +309,18 @@ impl Machine for Aggregator {
     }
 
     fn gone(&mut self, source: Source, post: &mut Post<'_>) {
-        let Some((&mailbox, _)) = self.planners.iter().find(|(_, planner)| **planner == source) else {
-            return;
-        };
-        self.planners.remove(mailbox);
-        let waiting = self.asked.iter().filter(|(_, (_, to))| *to == mailbox);
-        let requests: BTreeSet<_> = waiting
-            .filter_map(|(_, (waits, _))| match waits {
-                Waits::Collection(request) => Some(*request),
-                Waits::Routes(_) => None,
-            })
-            .collect();
-        for request in requests {
-            self.forget(request);
-            post.failed(
-                request,
-                &format!(
-                    "the route planner {source} of {mailbox} is gone: its node has ended or lost contact"
-                ),
-            );
+        for mailbox in self.planners.lost(source) {
+            self.unanswered(mailbox, source, post);
         }
+    }
+
+    fn wake(&mut self, post: &mut Post<'_>) {
+        for (mailbox, planner) in self.planners.overdue(post.now().monotonic) {
+            self.unanswered(mailbox, planner, post);
+        }
+    }
+
+    fn deadline(&self) -> Option<Monotonic> {
+        self.planners.deadline()
     }
 }

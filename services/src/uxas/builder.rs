@@ -7,14 +7,16 @@
 //! | idle | one without a request, without tasks, or with a vehicle that has no state | an error with the cause | idle |
 //! | busy | `TaskImplementationResponse` | the vehicle goes on from its end; asks the next task | busy |
 //! | busy | the last one | `UniqueAutomationResponse` | idle |
-//! | busy | one without waypoints | an error with the cause | idle |
-//! | busy | an error that names the request | forgets it | idle |
+//! | busy | one without waypoints | an error with the cause, an empty `UniqueAutomationResponse` | idle |
+//! | any | an error that names the request | an empty `UniqueAutomationResponse` with the cause | idle |
 //!
 //! Waypoints of a vehicle have new numbers in each plan. Configuration: `assignment_start_point_lead_m` (50),
 //! `add_loiter_to_end_of_mission` (false), `default_loiter_radius_m` (300), `turn_type` (none: as routes have it).
 
+mod failing;
+
 use super::aggregator::led;
-use super::machine::{FAILED_KEY, Heard, Machine, Post, REQUEST_KEY};
+use super::machine::{Heard, Machine, Post};
 use super::task::stay;
 use super::vehicle::Vehicle;
 use super::world::World;
@@ -120,11 +122,11 @@ impl Builder {
             let why = format!(
                 "ERROR::processTaskAssignmentSummary: Corresponding Unique Automation Request ID [{number}] not found!"
             );
-            return post.failed(number, &why);
+            return self.fail(number, &why, post);
         };
         let mut left: Vec<_> = summary.task_list.iter().filter_map(|one| one.get().cloned()).collect();
         if left.is_empty() {
-            return post.failed(number, &format!("No assignments found for request {number}"));
+            return self.fail(number, &format!("No assignments found for request {number}"), post);
         }
         // A stable sort: tasks that take no time stay in their vehicle's order.
         left.sort_by_key(|one| (one.time_task_completed, one.assigned_vehicle));
@@ -138,7 +140,7 @@ impl Builder {
                         "ERROR::processTaskAssignmentSummary: Corresponding Unique Automation Request included \
                          vehicle ID [{vehicle}] which does not have a corresponding current state!"
                     );
-                    return post.failed(number, &why);
+                    return self.fail(number, &why, post);
                 }
             }
         }
@@ -209,7 +211,7 @@ impl Builder {
             let why = format!(
                 "Task [{task}] option [{option}] assigned to vehicle [{vehicle}] reported an empty waypoint list for implementation!"
             );
-            return post.failed(number, &why);
+            return self.fail(number, &why, post);
         }
         let mut waypoints: Vec<Waypoint> =
             response.task_waypoints.iter().filter_map(|at| at.get().cloned()).collect();
@@ -315,19 +317,6 @@ impl Builder {
             last.vehicle_action_list.push(Ref::new(action));
         }
     }
-
-    fn status(&mut self, status: &ServiceStatus) {
-        let pairs: Vec<_> = status.info.iter().filter_map(|one| one.get()).collect();
-        let failed =
-            status.status_type == ServiceStatusType::Error && pairs.iter().any(|pair| pair.key == FAILED_KEY);
-        let number =
-            pairs.iter().find(|pair| pair.key == REQUEST_KEY).and_then(|pair| pair.value.parse::<i64>().ok());
-        if let Some(number) = number.filter(|_| failed) {
-            self.building.remove(&number);
-            self.requests.remove(&number);
-            self.speeds.remove(&number);
-        }
-    }
 }
 
 impl Projected {
@@ -388,7 +377,7 @@ impl Machine for Builder {
                 self.speeds.pop_first();
             }
         } else if let Some(status) = object.get::<ServiceStatus>() {
-            self.status(status);
+            self.status(status, post);
         }
     }
 }

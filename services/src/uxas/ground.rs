@@ -60,12 +60,13 @@ impl Ground {
         }
     }
 
-    /// The direction on the plane, in radians from north to east, of a heading in degrees at a place.
-    pub fn direction_rad(&self, at: &Location3D, heading_deg: f64) -> f64 {
+    /// A place on the plane, and the direction there, in radians from north to east, of a heading in degrees.
+    pub fn headed(&self, at: &Location3D, heading_deg: f64) -> (Point, f64) {
         match self {
-            Self::True(plane) => plane
-                .direction_rad(Place { latitude_deg: at.latitude, longitude_deg: at.longitude }, heading_deg),
-            Self::Flat(_) => heading_deg.to_radians(),
+            Self::True(plane) => {
+                plane.headed(Place { latitude_deg: at.latitude, longitude_deg: at.longitude }, heading_deg)
+            }
+            Self::Flat(flat) => (flat.to_plane(at.latitude, at.longitude), heading_deg.to_radians()),
         }
     }
 }

@@ -8,7 +8,7 @@
 //! | under way | a waypoint that leads to itself is passed | stays: aircraft circle, all others hold their place | waiting |
 //!
 //! `CurrentWaypoint` and `AssociatedTasks` of its states are those of the waypoint that it heads for. Configuration:
-//! `vehicle`, `period_ms` (1000).
+//! `vehicle`, `period_ms` (1000), `pace` (1: it moves by the clock).
 
 mod motion;
 
@@ -29,6 +29,9 @@ use std::time::Duration;
 /// The longest step of the motion, in seconds.
 const STEP_S: f64 = 0.1;
 
+/// The most seconds that it moves in one of the clock.
+const PACE_MAX: f64 = 1000.0;
+
 /// How it is configured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KinematicConfig {
@@ -36,6 +39,15 @@ pub struct KinematicConfig {
     pub vehicle: i64,
     /// How often it tells its state.
     pub period: Duration,
+    /// How many seconds it moves in one of the clock.
+    pub pace: f64,
+}
+
+impl KinematicConfig {
+    /// A vehicle that tells its state this often, and moves by the clock.
+    pub fn of(vehicle: i64, period: Duration) -> Self {
+        Self { vehicle, period, pace: 1.0 }
+    }
 }
 
 /// How long a vehicle stays.
@@ -74,8 +86,9 @@ impl Kinematic {
     /// A vehicle that is nowhere yet.
     pub fn new(config: KinematicConfig) -> Self {
         let period = config.period.max(Duration::from_millis(10));
+        let pace = if config.pace.is_finite() { config.pace.clamp(0.0, PACE_MAX) } else { 1.0 };
         Self {
-            config: KinematicConfig { period, ..config },
+            config: KinematicConfig { period, pace, ..config },
             vehicle: None,
             state: None,
             motion: None,
@@ -248,7 +261,7 @@ impl Machine for Kinematic {
         let now = post.now().monotonic;
         let elapsed = self.last.map_or(0.0, |last| (now - last).as_secs_f64());
         self.last = Some(now);
-        self.advance(elapsed, post);
+        self.advance(elapsed * self.config.pace, post);
         self.tell(post);
     }
 

@@ -10,7 +10,7 @@
 //! vehicles), `turn_radius_offset_m` (0), `minimum_waypoint_separation_m` (50), `compat_cost` (false: the reference's
 //! flat earth, straight ways, whole metres).
 
-mod region;
+pub(super) mod region;
 mod route;
 
 use super::ground::Ground;

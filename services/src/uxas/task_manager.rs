@@ -12,9 +12,9 @@
 
 use super::coordinator::Coordinator;
 use super::machine::{FAILED_KEY, Heard, LOST_KEY, Machine, Post, REQUEST_KEY};
+use super::planners;
 use super::task::life::{Context, Life, Numbers, TASK_KEY};
 use super::world::World;
-use aldis_envelope::Monotonic;
 use aldis_envelope::lmcp::cmasi::{EntityState, RemoveTasks, ServiceStatus, ServiceStatusType, Task};
 use aldis_envelope::lmcp::route::{EgressRouteResponse, RoutePlanResponse};
 use aldis_envelope::lmcp::uxtask::{
@@ -23,6 +23,7 @@ use aldis_envelope::lmcp::uxtask::{
     UniqueAutomationResponse,
 };
 use aldis_envelope::lmcp::{Object, Struct, TypeInfo};
+use aldis_envelope::{Monotonic, Source};
 use std::collections::BTreeMap;
 
 /// How many assignments are remembered.
@@ -127,18 +128,37 @@ impl TaskManager {
         lives.values_mut().for_each(|life| act(life, &mut context));
     }
 
-    /// Lets the task do something that waits for the answer with this number.
+    /// Lets the task do something that waits for the answer with this number, which comes from this service.
     fn waiting(
         &mut self,
         number: i64,
+        from: Source,
         post: &mut Post<'_>,
         act: impl FnOnce(&mut Life, &mut Context<'_, '_>),
     ) {
-        let Some(task) = self.numbers.waiting.remove(&number) else { return };
+        let Some((task, mailbox)) = self.numbers.waiting.remove(&number) else { return };
+        if let Some(mailbox) = mailbox {
+            self.numbers.planners.answered(mailbox, from);
+        }
         let Self { config, world, lives, numbers, summaries, .. } = self;
         let mut context = Context { world, post, numbers, summaries, compat: config.compat_cost };
         if let Some(life) = lives.get_mut(&task) {
             act(life, &mut context);
+        }
+    }
+
+    /// Nobody answers a mailbox of route planners: the tasks that wait for it tell the cause.
+    fn unanswered(&mut self, mailbox: &'static str, planner: Source, post: &mut Post<'_>) {
+        let why = planners::cause(mailbox, planner);
+        let waiting = self.numbers.waiting.iter().filter(|(_, (_, to))| *to == Some(mailbox));
+        let waiting: Vec<_> = waiting.map(|(&number, (task, _))| (number, *task)).collect();
+        let Self { config, world, lives, numbers, summaries, .. } = self;
+        for (number, task) in waiting {
+            numbers.waiting.remove(&number);
+            let mut context = Context { world, post, numbers, summaries, compat: config.compat_cost };
+            if let Some(life) = lives.get_mut(&task) {
+                life.unrouted(number, &why, &mut context);
+            }
         }
     }
 
@@ -158,15 +178,17 @@ impl TaskManager {
         }
     }
 
-    fn planning(&mut self, object: &dyn Object, post: &mut Post<'_>) {
+    fn planning(&mut self, object: &dyn Object, from: Source, post: &mut Post<'_>) {
         if let Some(request) = object.get::<UniqueAutomationRequest>() {
             self.each(post, |life, context| life.requested(request, context));
         } else if let Some(response) = object.get::<SensorFootprintResponse>() {
-            self.waiting(response.response_id, post, |life, context| life.footprints(response, context));
+            self.waiting(response.response_id, from, post, |life, context| {
+                life.footprints(response, context)
+            });
         } else if let Some(response) = object.get::<EgressRouteResponse>() {
-            self.waiting(response.response_id, post, |life, context| life.egress(response, context));
+            self.waiting(response.response_id, from, post, |life, context| life.egress(response, context));
         } else if let Some(response) = object.get::<RoutePlanResponse>() {
-            self.waiting(response.response_id, post, |life, context| life.routes(response, context));
+            self.waiting(response.response_id, from, post, |life, context| life.routes(response, context));
         } else if let Some(summary) = object.get::<TaskAssignmentSummary>() {
             self.summaries.insert(summary.corresponding_automation_request_id, summary.clone());
             while self.summaries.len() > SUMMARIES_MAX {
@@ -234,16 +256,26 @@ impl Machine for TaskManager {
         } else if let Some(status) = object.get::<ServiceStatus>() {
             self.status(status, heard.source.entity == post.source().entity);
         } else if !self.coordinator.take(object, post) {
-            self.planning(object, post);
+            self.planning(object, heard.source, post);
         }
     }
 
     fn wake(&mut self, post: &mut Post<'_>) {
         self.each(post, |life, context| life.wake(context));
         self.coordinator.wake(post);
+        for (mailbox, planner) in self.numbers.planners.overdue(post.now().monotonic) {
+            self.unanswered(mailbox, planner, post);
+        }
+    }
+
+    fn gone(&mut self, source: Source, post: &mut Post<'_>) {
+        for mailbox in self.numbers.planners.lost(source) {
+            self.unanswered(mailbox, source, post);
+        }
     }
 
     fn deadline(&self) -> Option<Monotonic> {
-        self.lives.values().filter_map(Life::deadline).chain(self.coordinator.deadline()).min()
+        let others = [self.coordinator.deadline(), self.numbers.planners.deadline()];
+        self.lives.values().filter_map(Life::deadline).chain(others.into_iter().flatten()).min()
     }
 }

@@ -8,7 +8,7 @@
 //! | idle | the first of the queue whose tasks are all initialized | sends it as `UniqueAutomationRequest` | busy |
 //! | busy | the `UniqueAutomationResponse` of it | answers in the kind of the request | idle |
 //! | busy | an error that names it | answers at once, empty, with the cause | idle |
-//! | busy | `MaxResponseTime_ms` after it was sent | answers, empty, and says what was silent | idle |
+//! | busy | `MaxResponseTime_ms` after it was sent | answers, empty, and says what was silent; an error tells all others | idle |
 //! | any | `MaxResponseTime_ms` after a request came whose tasks are not initialized | answers, empty | the same |
 //!
 //! A request that waits for its tasks holds up no other. Configuration: `max_response_time_ms` (5000, at least 10).
@@ -282,6 +282,8 @@ impl Machine for Validator {
             let text = format!(
                 "- automation request ID[{id}] was not ready in time and was not sent.\n- {silent}\n"
             );
+            // All who wait for it forget it.
+            post.failed(id, &silent);
             progress.texts.push((KEY.to_owned(), text));
             answer_empty(&pending, &progress.texts, post);
         }

@@ -1,6 +1,7 @@
 //! What shore knows of the fleet: the numbers behind the table and the result.
 
 use super::linked::Linked;
+use super::missions::Progress;
 use aldis_envelope::aldis::NodeStatus;
 use aldis_envelope::umaa::ErrorCondition;
 use aldis_envelope::{EntityId, Monotonic};
@@ -71,6 +72,8 @@ pub(super) struct Board {
     pub(super) silenced: Option<u64>,
     /// What is known of bad links, where the boats are behind some.
     pub(super) linked: Linked,
+    /// How far the missions are.
+    pub(super) missions: Progress,
     /// Calls that failed though the boat was not silenced when they were made.
     pub(super) failed_elsewhere: u64,
 }
@@ -88,6 +91,7 @@ pub(super) struct Outcome {
     pub(super) control: Control,
     pub(super) linked: Linked,
     pub(super) recovery: Control,
+    pub(super) missions: Progress,
     pub(super) crashes: u64,
     pub(super) ran: Duration,
 }
@@ -120,6 +124,7 @@ impl Board {
             control: self.control.clone(),
             linked: self.linked.clone(),
             recovery: self.recovery.clone(),
+            missions: self.missions.clone(),
             crashes: self.crashes.load(Ordering::Relaxed),
             ran,
         }

@@ -4,6 +4,7 @@ use super::board::{BOATS, Board, CONTENDED, CRASHING, SILENCED};
 use super::control::{self, Contender, Habit};
 use super::crashing::crashing;
 use super::linked;
+use super::missions::{self, Plan};
 use super::shore::ShoreDesk;
 use crate::cli::exit::Failure;
 use crate::cli::link::relay::Running;
@@ -39,7 +40,11 @@ fn failed<E: std::fmt::Display>(why: E) -> Failure {
 
 impl Fleet {
     /// Starts shore, then the boats.
-    pub(super) fn start(board: &Arc<Mutex<Board>>, link: Option<&Profile>) -> Result<Self, Failure> {
+    pub(super) fn start(
+        board: &Arc<Mutex<Board>>,
+        link: Option<&Profile>,
+        plan: &Plan,
+    ) -> Result<Self, Failure> {
         let port = TcpListener::bind("127.0.0.1:0")
             .and_then(|listener| listener.local_addr())
             .map_err(failed)?
@@ -56,10 +61,13 @@ impl Fleet {
         let prefixes = prefixes.into_iter().collect::<Result<Vec<_>, _>>().map_err(failed)?;
         let mut services = vec![desk_service(source, prefixes, desk)];
         services.extend(contenders(board, &guids, entity)?);
+        services.extend(missions::ashore(plan, board, &guids, entity)?);
         let Some(profile) = link else {
             let shore = start(&shore_text(port), services)?;
             let crashes = board.lock().unwrap_or_else(PoisonError::into_inner).crashes.clone();
-            let boats = BOATS.iter().map(|&boat| start_boat(boat, port, &crashes));
+            let boats = BOATS
+                .iter()
+                .map(|&boat| start_boat(boat, port, &crashes, missions::afloat(plan, &guids, boat)?));
             return Ok(Self {
                 shore,
                 boats: boats.collect::<Result<_, _>>()?,
@@ -74,7 +82,9 @@ impl Fleet {
         let boats = BOATS.iter().zip(&texts.boats).map(|(&boat, text)| {
             let alone = boat_text(boat, port).replace("mode = \"client\"", "mode = \"peer\"");
             let alone: Vec<_> = alone.lines().filter(|line| !line.starts_with("connect")).collect();
-            start(&(alone.join("\n") + "\n" + text), vec![linked::taker(board, boat)?])
+            let mut services = missions::afloat(plan, &guids, boat)?;
+            services.push(linked::taker(board, boat)?);
+            start(&(alone.join("\n") + "\n" + text), services)
         });
         Ok(Self { shore, boats: boats.collect::<Result<_, _>>()?, finish, statuses, relays })
     }
@@ -129,7 +139,12 @@ fn contenders(
 }
 
 /// A boat; the arbiter of one of them crashes.
-fn start_boat(boat: u64, port: u16, crashes: &Arc<AtomicU64>) -> Result<Member, Failure> {
+fn start_boat(
+    boat: u64,
+    port: u16,
+    crashes: &Arc<AtomicU64>,
+    services: Vec<ServiceSpec>,
+) -> Result<Member, Failure> {
     let config = Config::parse("demo", &boat_text(boat, port))?;
     let outside = runtime::outside(&config).map_err(failed)?;
     let mut node = runtime::node_config(&config);
@@ -138,6 +153,7 @@ fn start_boat(boat: u64, port: u16, crashes: &Arc<AtomicU64>) -> Result<Member, 
         .iter_mut()
         .filter(|spec| boat == CRASHING && spec.source.service == ServiceId::ALLOCATION);
     arbiters.for_each(|spec| *spec = crashing(spec.clone(), crashes));
+    node.services.extend(services);
     Member::start(node, outside)
 }
 
@@ -156,21 +172,18 @@ fn shore_text(port: u16) -> String {
     )
 }
 
-/// Boats go round in circles of different size and speed, off Narragansett Bay.
+/// A boat gives control of its autopilot, and of its missions.
 fn boat_text(boat: u64, port: u16) -> String {
-    let place = (boat - 400) as f64;
     format!(
         "name = \"boat-{boat}\"\nfleet = \"demo\"\nentities = [{boat}]\noperators = [1]\n\
          [bus]\nmode = \"client\"\nconnect = [\"tcp/127.0.0.1:{port}\"]\n[health]\nreport_period_ms = 1000\n\
-         [[service]]\nkind = \"track\"\nservice = 100\nlatitude_deg = {:.4}\nlongitude_deg = -71.35\n\
-         speed_m_per_s = {:.1}\nturn_rate_deg_per_s = {:.1}\nrate_hz = 10.0\n\
-         [[resource]]\nname = \"{}\"\npriorities = [\"eid1sid{}\", \"eid1sid{}\", \"eid1sid{}\"]\n",
-        41.40 + place * 0.02,
-        4.0 + place * 2.0,
-        place - 2.0,
+         [[resource]]\nname = \"{}\"\npriorities = [\"eid1sid{}\", \"eid1sid{}\", \"eid1sid{}\"]\n\
+         [[resource]]\nname = \"{}\"\npriorities = [\"eid1sid{}\"]\n",
         control::RESOURCE,
         control::PLANNER,
         control::OPERATOR,
         control::SURVEYOR,
+        missions::RESOURCE,
+        missions::server(boat),
     )
 }

@@ -197,7 +197,8 @@ fn rules(boat: u64) -> String {
          [[link.rule]]\ndescriptor = \"UMAA::SO::ResourceAllocation::ResourceAllocationReport\"\nclass = \"state\"\n\
          [[link.rule]]\ndescriptor = \"UMAA::SO::ResourceAllocation\"\nclass = \"command\"\nlifespan_s = 30\n\
          [[link.rule]]\ndescriptor = \"UMAA::SO::HealthReport\"\nclass = \"state\"\nrate_hz = 0.1\n\
-         [[link.rule]]\ndescriptor = \"afrl.vehicles\"\nclass = \"state\"\n"
+         [[link.rule]]\ndescriptor = \"afrl.cmasi.MissionCommand\"\nclass = \"command\"\nlifespan_s = 600\n\
+         [[link.rule]]\ndescriptor = \"afrl.vehicles.SurfaceVehicleState\"\nclass = \"state\"\n"
     )
 }
 

@@ -1,6 +1,7 @@
 //! The live table in the terminal.
 
 use super::board::{Board, CONTENDED, CRASHING, Control};
+use super::map::Chart;
 use crate::cli::print_line;
 use std::fmt::Write;
 use std::sync::atomic::Ordering;
@@ -19,7 +20,7 @@ fn held(control: &Control) -> String {
 }
 
 /// Draws the table over the last one.
-pub(super) fn draw(board: &mut Board, ran: Duration) {
+pub(super) fn draw(board: &mut Board, ran: Duration, chart: &Chart) {
     let mut text = String::from("\x1b[H\x1b[2J");
     // Writing to a String cannot fail.
     let _ = writeln!(
@@ -74,6 +75,8 @@ pub(super) fn draw(board: &mut Board, ran: Duration) {
         board.crashes.load(Ordering::Relaxed),
         recovery.recovered
     );
+    text.push('\n');
+    text.push_str(&chart.draw(board));
     if let Some(silenced) = board.silenced {
         let _ = writeln!(
             text,

@@ -1,7 +1,7 @@
 //! The shore station's service: hears the boats, and calls them each second.
 
 use super::board::{Board, SILENCED};
-use super::linked;
+use super::{control, linked};
 use crate::cli::member::Desk;
 use aldis_envelope::aldis::{self, NodeStatus};
 use aldis_envelope::umaa::{self, ErrorCondition, HealthReport, ResourceAllocationReport, Topic};
@@ -168,8 +168,11 @@ impl ShoreDesk {
     /// Who controls a boat's autopilot, as its arbiter says.
     fn reported(&self, boat: EntityId, message: &Message) {
         let report = umaa::decode::<ResourceAllocationReport>(&message.content).ok();
-        let session =
-            report.and_then(|report| report.control_info.iter().find_map(|info| info.control_session));
+        let autopilot = self.guids.of_resource(boat, control::RESOURCE);
+        let info = report.and_then(|report| {
+            report.control_info.iter().find(|info| info.resource_id == autopilot).cloned()
+        });
+        let session = info.and_then(|info| info.control_session);
         let named = |guid: Guid| self.guids.service(guid).map_or_else(|| guid.to_string(), |s| s.to_string());
         let holder = session.map(|session| {
             let end = session.end_time.map(|end| Wall::from(end).to_string());

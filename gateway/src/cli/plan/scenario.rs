@@ -41,12 +41,22 @@ impl Scenario {
                 Err(why) => eprintln!("aldis: {}: {why}; passed over", file.display()),
             }
         }
+        Self::of(&directory.display().to_string(), objects)
+    }
+
+    /// The scenario of one document.
+    pub(in crate::cli) fn parse(name: &str, text: &str) -> Result<Self, Failure> {
+        let found = document(text).map_err(|why| Failure::Usage(format!("{name}: {why}")))?;
+        Self::of(name, found.into_iter().map(|object| (name.to_owned(), object)).collect())
+    }
+
+    fn of(from: &str, mut objects: Vec<(String, Box<dyn Object>)>) -> Result<Self, Failure> {
         // Who refers to something comes after it; files keep their order otherwise.
         objects.sort_by_key(|(_, object)| rank(object.as_ref()));
         let scenario = Self { entity: planner(&objects)?, objects };
         if scenario.requests().is_empty() {
             let why = "no AutomationRequest of any kind is in it";
-            return Err(Failure::Usage(format!("{}: {why}", directory.display())));
+            return Err(Failure::Usage(format!("{from}: {why}")));
         }
         Ok(scenario)
     }

@@ -49,7 +49,7 @@ impl Fleet {
             let mut cores = Core::pipeline(false, 0.0);
             for &vehicle in &vehicles {
                 cores.push(Core::Waypoints(WaypointConfig::of(vehicle)));
-                cores.push(Core::Kinematic(KinematicConfig { vehicle, period: PERIOD }));
+                cores.push(Core::Kinematic(KinematicConfig::of(vehicle, PERIOD)));
             }
             let mut node = Offline::new(scenario.entity, named(cores)).map_err(Failure::Failed)?;
             node.play(at_once(scenario.told()));
@@ -159,7 +159,7 @@ fn members(
     }
     let mut members = Vec::new();
     for (place, &vehicle) in (before..).zip(vehicles) {
-        let config = KinematicConfig { vehicle, period: PERIOD };
+        let config = KinematicConfig::of(vehicle, PERIOD);
         let own = entity(vehicle)?;
         let core = match control {
             Some(file) => Core::GuardedKinematic(config, Control::of(own, &file.resource)),

@@ -65,7 +65,7 @@ const ROWS: &[Row] = &[
             ("TurnRadiusOffset_m", Number("turn_radius_offset_m")),
             ("MinimumWaypointSeparation_m", Number("minimum_waypoint_separation_m")),
             ("isRoutAggregator", Value::Nothing("the aggregator is a service of its own")),
-            ("OsmFileName", Value::Nothing("there are no roads")),
+            ("OsmFileName", Value::Nothing("roads are an OsmPlannerService's")),
         ],
     },
     Row {
@@ -153,12 +153,12 @@ const ROWS: &[Row] = &[
     },
     Row {
         names: &["OsmPlannerService"],
-        here: Nothing("there are no roads at sea"),
+        here: Service("osm-planner"),
         attributes: &[
-            ("OsmFile", Value::Nothing("")),
-            ("MapEdgesFile", Value::Nothing("")),
-            ("ShortestPathFile", Value::Nothing("")),
-            ("MetricsFile", Value::Nothing("")),
+            ("OsmFile", Text("osm_file")),
+            ("MapEdgesFile", Value::Nothing("the map is not drawn")),
+            ("ShortestPathFile", Value::Nothing("ways are told in answers alone")),
+            ("MetricsFile", Value::Nothing("`aldis bench plan` measures")),
         ],
     },
 ];

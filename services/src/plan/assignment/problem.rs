@@ -109,6 +109,11 @@ impl Problem {
         plain && !self.has_order()
     }
 
+    /// Whether no option is named twice.
+    pub(super) fn is_once(&self) -> bool {
+        self.groups.iter().map(Vec::len).sum::<usize>() == self.atoms.len()
+    }
+
     /// Whether something comes before something.
     pub(super) fn has_order(&self) -> bool {
         self.before.iter().any(|before| !before.is_empty())

@@ -1,4 +1,4 @@
-//! General process algebra: depth-first branch and bound over what may come next.
+//! General process algebra: depth-first branch and bound over the options that may come next.
 //!
 //! A state is what was executed, and where and when each vehicle is. States are pruned that cannot beat the best plan, and those
 //! that another dominates: same executed, same places, no time later.
@@ -17,6 +17,24 @@ const GROUPS_MAX: usize = 40;
 
 /// The most states remembered for dominance; what is beyond is searched without.
 const REMEMBERED_MAX: usize = 400_000;
+
+/// A search for the best plan, which can be stopped after any number of nodes and go on later.
+pub(super) trait Search: Send {
+    /// Whether everything was searched.
+    fn is_done(&self) -> bool;
+
+    /// The least value that what is still open could have.
+    fn open_bound(&self) -> Option<(i64, i64)>;
+
+    /// Looks at about `nodes` states for plans of less than `best`, which each one found becomes. Gives the nodes used.
+    fn search(
+        &mut self,
+        problem: &Problem,
+        nodes: u64,
+        best: &mut (i64, i64),
+        found: &mut dyn FnMut(Routes),
+    ) -> u64;
+}
 
 #[derive(Debug, Clone)]
 struct State {
@@ -57,52 +75,6 @@ impl Tree {
         };
         let algebra = Algebra::new(&problem.expression, problem.atoms.len());
         Some(Self { algebra, relaxation, stack: vec![root], seen: BTreeMap::new(), remembered: 0 })
-    }
-
-    /// Whether everything was searched.
-    pub(super) fn is_done(&self) -> bool {
-        self.stack.is_empty()
-    }
-
-    /// The least value that what is still open could have.
-    pub(super) fn open_bound(&self) -> Option<(i64, i64)> {
-        self.stack.iter().map(|state| state.bound).min()
-    }
-
-    /// Looks at about `nodes` states for plans of less than `best`, which each one found becomes. Gives the nodes used.
-    pub(super) fn search(
-        &mut self,
-        problem: &Problem,
-        nodes: u64,
-        best: &mut (i64, i64),
-        found: &mut impl FnMut(Routes),
-    ) -> u64 {
-        let mut used = 0;
-        while used < nodes {
-            let Some(state) = self.stack.pop() else { break };
-            used += 1;
-            if state.bound >= *best || self.is_dominated(&state) {
-                continue;
-            }
-            let mut children = Vec::new();
-            let open = self.algebra.next(&state.executed, &mut |atom| {
-                for vehicle in 0..problem.vehicles.len() {
-                    children.extend(self.child(problem, &state, vehicle, atom));
-                }
-            });
-            if open {
-                used += children.len() as u64;
-                children.retain(|child| child.bound < *best);
-                // The best is searched first: it is taken from the end.
-                children.sort_by(|a, b| (b.bound, b.order.last()).cmp(&(a.bound, a.order.last())));
-                self.stack.append(&mut children);
-            } else {
-                let total = state.ends.iter().sum();
-                *best = problem.value(state.ends.iter().copied().max().unwrap_or(0), total);
-                found(routes(problem, &state));
-            }
-        }
-        used
     }
 
     fn child(&self, problem: &Problem, state: &State, vehicle: usize, atom: usize) -> Option<State> {
@@ -148,6 +120,51 @@ impl Tree {
             self.remembered += 1;
         }
         false
+    }
+}
+
+impl Search for Tree {
+    fn is_done(&self) -> bool {
+        self.stack.is_empty()
+    }
+
+    fn open_bound(&self) -> Option<(i64, i64)> {
+        self.stack.iter().map(|state| state.bound).min()
+    }
+
+    fn search(
+        &mut self,
+        problem: &Problem,
+        nodes: u64,
+        best: &mut (i64, i64),
+        found: &mut dyn FnMut(Routes),
+    ) -> u64 {
+        let mut used = 0;
+        while used < nodes {
+            let Some(state) = self.stack.pop() else { break };
+            used += 1;
+            if state.bound >= *best || self.is_dominated(&state) {
+                continue;
+            }
+            let mut children = Vec::new();
+            let open = self.algebra.next(&state.executed, &mut |atom| {
+                for vehicle in 0..problem.vehicles.len() {
+                    children.extend(self.child(problem, &state, vehicle, atom));
+                }
+            });
+            if open {
+                used += children.len() as u64;
+                children.retain(|child| child.bound < *best);
+                // The best is searched first: it is taken from the end.
+                children.sort_by(|a, b| (b.bound, b.order.last()).cmp(&(a.bound, a.order.last())));
+                self.stack.append(&mut children);
+            } else {
+                let total = state.ends.iter().sum();
+                *best = problem.value(state.ends.iter().copied().max().unwrap_or(0), total);
+                found(routes(problem, &state));
+            }
+        }
+        used
     }
 }
 

@@ -107,18 +107,31 @@ type Step = (f64, f64);
 
 /// All words that lead from a pose to another, in no order.
 pub fn words(from: Pose, to: Pose, radius_m: f64) -> Vec<Word> {
+    let found = candidates(from, to, radius_m).into_iter().flatten();
+    found.filter_map(|steps| word(from, to, radius_m, steps)).collect()
+}
+
+/// The length of the shortest word; none where none leads there.
+pub fn shortest_m(from: Pose, to: Pose, radius_m: f64) -> Option<f64> {
+    let radii = |steps: &[Step; 3]| steps.iter().map(|step| step.1).sum::<f64>();
+    let mut found: Vec<[Step; 3]> = candidates(from, to, radius_m).into_iter().flatten().collect();
+    found.sort_by(|a, b| radii(a).total_cmp(&radii(b)));
+    found.into_iter().find_map(|steps| Some(word(from, to, radius_m, steps)?.length_m))
+}
+
+/// The steps of all words, some of which may not lead there.
+fn candidates(from: Pose, to: Pose, radius_m: f64) -> [Option<[Step; 3]>; 6] {
     let (x, y) = (to.at.0 - from.at.0, to.at.1 - from.at.1);
     let (distance, direction) = (x.hypot(y) / radius_m, y.atan2(x));
     let (a, b) = (from.heading_rad - direction, to.heading_rad - direction);
-    let found = [
+    [
         same_side(1.0, distance, a, b),
         same_side(-1.0, distance, a, b),
         change_side(1.0, distance, a, b),
         change_side(-1.0, distance, a, b),
         three_turns(1.0, distance, a, b),
         three_turns(-1.0, distance, a, b),
-    ];
-    found.into_iter().flatten().filter_map(|steps| word(from, to, radius_m, steps)).collect()
+    ]
 }
 
 /// A turn from 0 to below a full one.

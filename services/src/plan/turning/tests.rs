@@ -14,6 +14,15 @@ fn shortest(from: Pose, to: Pose, radius: f64) -> f64 {
 }
 
 #[test]
+fn the_shortest_word_is_the_least_of_all() {
+    let mut random = fastrand::Rng::with_seed(5);
+    for _ in 0..2000 {
+        let (from, to) = (pose(&mut random, 500.0), pose(&mut random, 500.0));
+        assert!((shortest_m(from, to, 60.0).unwrap() - shortest(from, to, 60.0)).abs() < 1e-6);
+    }
+}
+
+#[test]
 fn words_lead_to_the_goal_and_back_in_the_same_length() {
     let mut random = fastrand::Rng::with_seed(2);
     for _ in 0..2_000 {

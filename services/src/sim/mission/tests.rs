@@ -14,17 +14,17 @@ use aldis_envelope::lmcp::vehicles::{SurfaceVehicleConfiguration, SurfaceVehicle
 use aldis_envelope::lmcp::{Object, Ref, decode};
 use std::time::Duration;
 
-const BOAT: i64 = 400;
+pub(super) const BOAT: i64 = 400;
 
-fn id(number: u64) -> EntityId {
+pub(super) fn id(number: u64) -> EntityId {
     EntityId::new(number).unwrap()
 }
 
-fn at(latitude: f64) -> Location3D {
+pub(super) fn at(latitude: f64) -> Location3D {
     Location3D { latitude, longitude: 20.0, ..Location3D::default() }
 }
 
-fn boat() -> Vec<Box<dyn Object>> {
+pub(super) fn boat() -> Vec<Box<dyn Object>> {
     let mut boat = SurfaceVehicleConfiguration::default();
     (boat.id, boat.nominal_speed) = (BOAT, 5.0);
     let mut state = SurfaceVehicleState::default();
@@ -33,7 +33,7 @@ fn boat() -> Vec<Box<dyn Object>> {
 }
 
 /// To two places, a kilometre apart.
-fn mission(number: i64, latitudes: [f64; 2]) -> Box<dyn Object> {
+pub(super) fn mission(number: i64, latitudes: [f64; 2]) -> Box<dyn Object> {
     let mut mission = MissionCommand { first_waypoint: 1, ..MissionCommand::default() };
     (mission.vehicle_id, mission.command_id) = (BOAT, number);
     mission.waypoint_list = (1..=2)
@@ -51,20 +51,24 @@ fn mission(number: i64, latitudes: [f64; 2]) -> Box<dyn Object> {
     Box::new(mission)
 }
 
-fn shore(number: u64) -> Member {
+pub(super) fn shore(number: u64) -> Member {
     let control = Control::of(id(400), "autopilot");
     let core = Core::ControlledWaypoints(WaypointConfig::of(BOAT), control);
     Member::new(id(number), vec![("missions".to_owned(), Kind::Core(core))])
 }
 
-fn vehicle(may: Vec<aldis_envelope::Source>) -> Member {
-    let config = KinematicConfig { vehicle: BOAT, period: Duration::from_millis(500) };
+pub(super) fn vehicle(may: Vec<aldis_envelope::Source>) -> Member {
+    let config = KinematicConfig::of(BOAT, Duration::from_millis(500));
     let core = Core::GuardedKinematic(config, Control::of(id(400), "autopilot"));
     let services = vec![("boat".to_owned(), Kind::Core(core))];
     Member { resource: Some(("autopilot".to_owned(), may)), ..Member::new(id(400), services) }
 }
 
-fn fleet(profile: Option<&Profile>, shores: Vec<Member>, may: Vec<aldis_envelope::Source>) -> Missions {
+pub(super) fn fleet(
+    profile: Option<&Profile>,
+    shores: Vec<Member>,
+    may: Vec<aldis_envelope::Source>,
+) -> Missions {
     let count = shores.len();
     let members = shores.into_iter().chain([vehicle(may)]).collect();
     let mut fleet = Missions::new(7, profile, count, members).unwrap();
@@ -76,11 +80,11 @@ fn fleet(profile: Option<&Profile>, shores: Vec<Member>, may: Vec<aldis_envelope
     fleet
 }
 
-fn play(fleet: &mut Missions, member: usize, object: Box<dyn Object>) {
+pub(super) fn play(fleet: &mut Missions, member: usize, object: Box<dyn Object>) {
     fleet.play(member, vec![Played { at: Duration::ZERO, object }]);
 }
 
-fn statuses(heard: &[Overheard]) -> Vec<String> {
+pub(super) fn statuses(heard: &[Overheard]) -> Vec<String> {
     let decoded = heard.iter().filter_map(|one| decode(&one.content).ok());
     let of = decoded.filter_map(|object| object.get::<ServiceStatus>().cloned());
     let said = of.filter_map(|status| Some(status.info.first()?.get()?.value.to_string()));
@@ -89,7 +93,7 @@ fn statuses(heard: &[Overheard]) -> Vec<String> {
 }
 
 /// Latitude, speed and the number of the mission, state by state.
-fn states(heard: &[Overheard]) -> Vec<(f64, f32, i64)> {
+pub(super) fn states(heard: &[Overheard]) -> Vec<(f64, f32, i64)> {
     let decoded = heard.iter().filter_map(|one| decode(&one.content).ok());
     let of = decoded.filter_map(|object| object.get::<EntityState>().cloned());
     of.map(|state| (state.location.get().unwrap().latitude, state.groundspeed, state.current_command >> 16))

@@ -1,25 +1,31 @@
 //! Whole plans by the core services on a node alone, and what happens where there is none.
 
 use super::{Offline, Played};
+use crate::plan::roads::OneWay;
 use crate::registry::Kind;
 use crate::uxas::Core;
+use crate::uxas::osm::OsmConfig;
 use crate::uxas::validator::failure;
 use aldis_envelope::lmcp::cmasi::{
     AutomationRequest, AutomationResponse, Circle, KeepOutZone, Location3D, MissionCommand, OperatingRegion,
     PointSearchTask,
 };
+use aldis_envelope::lmcp::impact::CordonTask;
 use aldis_envelope::lmcp::uxtask::{TaskAssignmentSummary, TaskPlanOptions};
-use aldis_envelope::lmcp::vehicles::{SurfaceVehicleConfiguration, SurfaceVehicleState};
+use aldis_envelope::lmcp::vehicles::{
+    GroundVehicleConfiguration, GroundVehicleState, SurfaceVehicleConfiguration, SurfaceVehicleState,
+};
 use aldis_envelope::lmcp::{Object, Ref, Text, decode, read_xml};
 use aldis_envelope::{EntityId, Monotonic};
+use bytes::Bytes;
 use std::path::Path;
 use std::time::Duration;
 
-fn at(latitude: f64, longitude: f64) -> Ref<Location3D> {
+pub(super) fn at(latitude: f64, longitude: f64) -> Ref<Location3D> {
     Ref::new(Location3D { latitude, longitude, ..Location3D::default() })
 }
 
-fn boat(id: i64, latitude: f64) -> Vec<Box<dyn Object>> {
+pub(super) fn boat(id: i64, latitude: f64) -> Vec<Box<dyn Object>> {
     let mut boat = SurfaceVehicleConfiguration::default();
     (boat.id, boat.nominal_speed) = (id, 5.0);
     let mut state = SurfaceVehicleState::default();
@@ -27,13 +33,13 @@ fn boat(id: i64, latitude: f64) -> Vec<Box<dyn Object>> {
     vec![Box::new(boat), Box::new(state)]
 }
 
-fn point(id: i64, latitude: f64, longitude: f64) -> Box<dyn Object> {
+pub(super) fn point(id: i64, latitude: f64, longitude: f64) -> Box<dyn Object> {
     let mut task = PointSearchTask { search_location: at(latitude, longitude), ..PointSearchTask::default() };
     task.task_id = id;
     Box::new(task)
 }
 
-fn request(entities: &[i64], tasks: &[i64], relationships: &str, region: i64) -> Box<dyn Object> {
+pub(super) fn request(entities: &[i64], tasks: &[i64], relationships: &str, region: i64) -> Box<dyn Object> {
     Box::new(AutomationRequest {
         entity_list: entities.to_vec(),
         task_list: tasks.to_vec(),
@@ -44,7 +50,7 @@ fn request(entities: &[i64], tasks: &[i64], relationships: &str, region: i64) ->
 }
 
 /// Two boats, an island that is kept out of, and two points.
-fn sea() -> Vec<Box<dyn Object>> {
+pub(super) fn sea() -> Vec<Box<dyn Object>> {
     let mut island = KeepOutZone::default();
     (island.zone_id, island.padding) = (5, 20.0);
     island.boundary = Ref::new(Circle { center_point: at(60.02, 20.0), radius: 500.0, ..Circle::default() });
@@ -57,14 +63,14 @@ fn sea() -> Vec<Box<dyn Object>> {
     sea
 }
 
-fn node(without: Option<&str>, compat: bool) -> Offline {
+pub(super) fn node(without: Option<&str>, compat: bool) -> Offline {
     let cores = Core::pipeline(compat, 0.0).into_iter().filter(|core| Some(core.name()) != without);
     let services = cores.map(|core| (core.name().to_owned(), Kind::Core(core))).collect();
     Offline::new(EntityId::new(100).unwrap(), services).unwrap()
 }
 
 /// What a node heard of one type.
-fn all<T: aldis_envelope::lmcp::Struct>(heard: &[super::Overheard]) -> Vec<(T, Monotonic)> {
+pub(super) fn all<T: aldis_envelope::lmcp::Struct>(heard: &[super::Overheard]) -> Vec<(T, Monotonic)> {
     let of_type = heard.iter().filter(|one| one.descriptor == T::TYPE.full_name);
     of_type.map(|one| (decode(&one.content).unwrap().get::<T>().unwrap().clone(), one.at)).collect()
 }
@@ -86,13 +92,6 @@ fn ask(
         }
         assert!(node.step(Monotonic::since_start(Duration::from_secs(60))), "no answer: {:?}", node.notes);
     }
-}
-
-fn refused(told: Vec<Box<dyn Object>>, request: Box<dyn Object>) -> String {
-    let (answer, took, _) = ask(&mut node(None, false), told, request);
-    assert!(took <= Duration::from_millis(100), "{took:?}");
-    assert!(answer.mission_command_list.is_empty());
-    failure(&answer).expect("an answer without a plan says why")
 }
 
 #[test]
@@ -126,61 +125,41 @@ fn boats_go_around_an_island_to_both_points() {
 }
 
 #[test]
-fn each_failure_is_answered_at_once_with_its_cause() {
-    for (asked, cause) in [
-        (request(&[1, 7], &[100], "", 9), "EntityConfiguration for Entity Id[7] not available"),
-        (request(&[1], &[100, 33], "", 9), "Task with the Id[33] is unknown"),
-        (request(&[1], &[100], "", 4), "OperatingRegion Id[4] not available"),
-        (request(&[1], &[100], "", 8), "KeepOutArea Id[55] not available"),
-        (request(&[1], &[], "", 9), "names no task"),
-        (request(&[1], &[100, 101], "|(p100 p101", 9), "character 8: the id after `p`"),
-        (request(&[1], &[100, 101], "|(p100 )", 9), "task 101 is in the request, but"),
-        (request(&[1], &[102], "", 9), "keep-out zone 5: the nearest way out is at latitude 60.02"),
-    ] {
-        let why = refused(sea(), asked);
-        assert!(why.contains(cause), "{why}\n  should tell\n{cause}");
-    }
-}
-
-#[test]
-fn a_task_that_nobody_here_may_do_or_that_lacks_its_line_is_told() {
-    let mut told = sea();
-    let mut private = PointSearchTask { search_location: at(60.04, 20.0), ..PointSearchTask::default() };
-    (private.task_id, private.eligible_entities) = (200, vec![2]);
-    told.push(Box::new(private));
-    assert!(refused(told, request(&[1], &[200], "", 9)).contains("task 200: no eligible vehicle"));
-    let mut told = sea();
-    let mut angled =
-        aldis_envelope::lmcp::impact::AngledAreaSearchTask { search_area_id: 77, ..Default::default() };
-    angled.task_id = 201;
-    told.push(Box::new(angled));
-    let why = refused(told, request(&[1], &[201], "", 9));
-    assert!(why.contains("AreaOfInterest Id[77] not available"), "{why}");
-}
-
-#[test]
-fn who_is_silent_is_named_when_the_time_is_over() {
-    for (missing, cause) in [
-        ("RoutePlannerVisibility", "no AssignmentCostMatrix"),
-        ("AssignmentTreeBranchBound", "no TaskAssignmentSummary"),
-        ("PlanBuilder", "no UniqueAutomationResponse"),
-    ] {
-        let (answer, took, _) = ask(&mut node(Some(missing), false), sea(), request(&[1], &[100], "", 9));
-        assert!(failure(&answer).unwrap().contains(cause), "{answer:?}");
-        assert!(took >= Duration::from_secs(5) && took <= Duration::from_millis(5100), "{took:?}");
-    }
-    let (answer, took, _) = ask(&mut node(Some("TaskManager"), false), sea(), request(&[1], &[100], "", 9));
-    assert!(failure(&answer).unwrap().contains("not initialized: [100]"), "{answer:?}");
-    assert!(took <= Duration::from_millis(5100));
-}
-
-#[test]
 fn the_same_messages_make_the_same_plan_to_the_byte() {
     let plan = || {
         let (_, _, heard) = ask(&mut node(None, false), sea(), request(&[1, 2], &[100, 101], "", 9));
         heard.into_iter().map(|one| (one.descriptor, one.content)).collect::<Vec<_>>()
     };
     assert!(plan() == plan());
+}
+
+#[test]
+fn a_cordon_closes_the_roads_that_lead_out_of_a_town() {
+    let town = Bytes::from_static(include_bytes!("../../uxas/osm/town.osm"));
+    let mut cores = Core::pipeline(false, 0.0);
+    cores.push(Core::Roads(OsmConfig::new(town, OneWay::Respect).unwrap()));
+    let services = cores.into_iter().map(|core| (core.name().to_owned(), Kind::Core(core))).collect();
+    let mut node = Offline::new(EntityId::new(100).unwrap(), services).unwrap();
+    let mut told = Vec::new();
+    for (id, longitude) in (1..=4).zip([19.99, 19.995, 20.005, 20.01]) {
+        let mut car = GroundVehicleConfiguration::default();
+        (car.id, car.nominal_speed) = (id, 10.0);
+        let mut state = GroundVehicleState::default();
+        (state.id, state.location) = (id, at(60.0, longitude));
+        told.extend([Box::new(car) as Box<dyn Object>, Box::new(state)]);
+    }
+    let mut cordon = CordonTask { cordon_location: at(60.0, 20.0), ..CordonTask::default() };
+    (cordon.task_id, cordon.standoff_distance) = (300, 300.0);
+    told.push(Box::new(cordon));
+    let (answer, _, _) = ask(&mut node, told, request(&[1, 2, 3, 4], &[300], "", 0));
+    assert_eq!(failure(&answer), None);
+    let ends = answer.mission_command_list.iter().map(|mission| {
+        let last = mission.get().unwrap().waypoint_list.last().unwrap().get().unwrap().clone();
+        (((last.latitude - 60.0) * 1e4).round() as i64, ((last.longitude - 20.0) * 1e4).round() as i64)
+    });
+    let ends: std::collections::BTreeSet<_> = ends.collect();
+    // 300 m are 0.0027 degrees to the north, and twice as many to the east.
+    assert_eq!(ends, [(-27, 0), (0, -54), (0, 54), (27, 0)].into_iter().collect());
 }
 
 /// The messages of a folder beside the project, requests last; none where it is not there.

@@ -83,10 +83,11 @@ fn plan(asked: &RoutePlanRequest, fails: i64) -> RoutePlanResponse {
 
 fn holds_a(aggregator: &Aggregator) {
     for (number, (waits, _)) in &aggregator.asked {
-        let in_gatherings = aggregator.gatherings.values().filter(|one| one.open.contains(number)).count();
+        let in_gatherings =
+            aggregator.gatherings.values().filter(|one| one.open.contains_key(number)).count();
         match waits {
             Waits::Routes(own) => {
-                assert!(aggregator.gatherings[own].open.contains(number));
+                assert!(aggregator.gatherings[own].open.contains_key(number));
                 assert_eq!(in_gatherings, 1);
             }
             Waits::Collection(request) => {

@@ -85,7 +85,7 @@ fn missions_of_another_shore_are_not_its_own_to_serve() {
 
 #[test]
 fn a_vehicle_without_an_arbiter_follows_nobody() {
-    let config = KinematicConfig { vehicle: 400, period: Duration::from_secs(1) };
+    let config = KinematicConfig::of(400, Duration::from_secs(1));
     let mut vehicle = GuardedVehicle::new(source(400, 100), &guids(), config, control());
     give(&mut vehicle, 0, Input::HistoryComplete(true));
     let early = give(&mut vehicle, 1, Input::Message(&mission(source(1, 100))));

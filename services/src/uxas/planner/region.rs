@@ -2,7 +2,7 @@
 
 use super::{PlannerConfig, plane};
 use crate::plan::free_space::{Boundary, Conditions, FreeSpace, RouteError, Zone, ZoneKind};
-use crate::plan::turning::TurningSpace;
+use crate::plan::turning::{Pose, TurningSpace};
 use crate::uxas::ground::{Ground, Point, middle};
 use crate::uxas::vehicle::{Medium, Vehicle};
 use crate::uxas::world::World;
@@ -20,19 +20,24 @@ const STEERING_M: f64 = 0.5;
 /// Turns tighter than this, in metres, are none.
 pub(super) const RADIUS_MIN_M: f64 = 1.0;
 
+/// How many ways and places are kept; then they begin anew.
+const KNOWN_MAX: usize = 65_536;
+
 /// A straight way: its corners, and its length.
 pub(super) type Straight = Result<(Vec<Point>, f64), String>;
 
 /// A region for a vehicle.
-pub(super) struct Region {
+pub(in crate::uxas) struct Region {
     pub(super) vehicle: Vehicle,
-    pub(super) ground: Ground,
-    pub(super) space: FreeSpace,
+    pub(in crate::uxas) ground: Ground,
+    pub(in crate::uxas) space: FreeSpace,
     pub(super) turning: Turning,
     pub(super) compat: bool,
     pub(super) separation_m: f64,
     /// Straight ways that were found already, by the bits of their ends.
-    pub(super) known: BTreeMap<[u64; 4], Straight>,
+    known: BTreeMap<[u64; 4], Straight>,
+    /// Places with headings on the plane, by the bits of what they are in degrees: the ends of options come in thousands of ways.
+    poses: BTreeMap<[u64; 3], Pose>,
 }
 
 /// Free space with turns: made when the first route with waypoints is asked for.
@@ -49,7 +54,7 @@ pub(super) enum Turning {
 ///
 /// # Errors
 /// What is wrong with the region's zones, in words.
-pub(super) fn build(
+pub(in crate::uxas) fn build(
     world: &World,
     region: i64,
     vehicle: Vehicle,
@@ -107,7 +112,16 @@ pub(super) fn build(
         false => Turning::None,
     };
     let (compat, separation_m) = (config.compat_cost, config.minimum_waypoint_separation_m.max(1.0));
-    Ok(Region { vehicle, ground, space, turning, compat, separation_m, known: BTreeMap::new() })
+    Ok(Region {
+        vehicle,
+        ground,
+        space,
+        turning,
+        compat,
+        separation_m,
+        known: BTreeMap::new(),
+        poses: BTreeMap::new(),
+    })
 }
 
 /// A zone of a message on a plane.
@@ -154,10 +168,27 @@ impl Region {
     /// The shortest way without turns.
     pub(super) fn straight(&mut self, from: Point, to: Point) -> &Straight {
         let key = [from.0, from.1, to.0, to.1].map(f64::to_bits);
+        if self.known.len() >= KNOWN_MAX {
+            self.known.clear();
+        }
         let (space, ground) = (&self.space, &self.ground);
         self.known.entry(key).or_insert_with(|| match space.route(from, to) {
             Ok(route) => Ok((route.points, route.length_m)),
             Err(why) => Err(in_degrees(&why, ground)),
+        })
+    }
+
+    /// A place on the plane, with the direction of a heading in degrees.
+    pub(super) fn pose(&mut self, at: &Location3D, heading_deg: f32) -> Pose {
+        if self.poses.len() >= KNOWN_MAX {
+            self.poses.clear();
+        }
+        let heading_deg = f64::from(heading_deg);
+        let key = [at.latitude, at.longitude, heading_deg].map(f64::to_bits);
+        let ground = &self.ground;
+        *self.poses.entry(key).or_insert_with(|| {
+            let (at, heading_rad) = ground.headed(at, heading_deg);
+            Pose { at, heading_rad }
         })
     }
 

@@ -2,7 +2,7 @@
 
 use super::region::{RADIUS_MIN_M, Region, in_degrees};
 use crate::plan::free_space::Point;
-use crate::plan::turning::{Piece, Pose, TurningError, words};
+use crate::plan::turning::{Piece, Pose, TurningError, shortest_m};
 use crate::uxas::ground::far;
 use aldis_envelope::lmcp::Ref;
 use aldis_envelope::lmcp::cmasi::{Location3D, Waypoint};
@@ -22,22 +22,17 @@ impl Region {
     /// Why there is none, in words.
     pub(super) fn route(&mut self, asked: &RouteConstraints, cost_only: bool) -> Routed {
         let (start, end) = (place(&asked.start_location, "start")?, place(&asked.end_location, "goal")?);
-        let (from, to) = (self.ground.point(start), self.ground.point(end));
-        let (start_rad, end_rad) = (
-            self.ground.direction_rad(start, f64::from(asked.start_heading)),
-            self.ground.direction_rad(end, f64::from(asked.end_heading)),
-        );
+        let poses = (self.pose(start, asked.start_heading), self.pose(end, asked.end_heading));
         let is_headed = asked.use_start_heading && asked.use_end_heading;
         let turns = is_headed && self.vehicle.turn_radius_m >= RADIUS_MIN_M && !self.compat;
         if !turns {
             let compat = self.compat;
-            let (points, length_m) = self.straight(from, to).clone()?;
+            let (points, length_m) = self.straight(poses.0.at, poses.1.at).clone()?;
             let metres = if compat { whole_metres(&points) } else { length_m };
             let cost = self.time_ms(metres)?;
             let waypoints = if cost_only { Vec::new() } else { self.waypoints(&points[1..]) };
             return Ok((cost, waypoints));
         }
-        let poses = (Pose { at: from, heading_rad: start_rad }, Pose { at: to, heading_rad: end_rad });
         if cost_only {
             let length_m = self.estimate(poses)?;
             return Ok((self.time_ms(length_m)?, Vec::new()));
@@ -53,9 +48,7 @@ impl Region {
     fn estimate(&mut self, (start, goal): (Pose, Pose)) -> Result<f64, String> {
         let radius = self.vehicle.turn_radius_m;
         let (points, _) = self.straight(start.at, goal.at).as_ref().map_err(Clone::clone)?;
-        let shortest = |from: Pose, to: Pose| {
-            words(from, to, radius).iter().map(|word| word.length_m).fold(f64::INFINITY, f64::min)
-        };
+        let shortest = |from: Pose, to: Pose| shortest_m(from, to, radius).unwrap_or(f64::INFINITY);
         let heading = |from: Point, to: Point| (to.1 - from.1).atan2(to.0 - from.0);
         let mut pose = start;
         let mut sum = 0.0;

@@ -12,11 +12,13 @@ pub(crate) use planning::route_error;
 use super::state::{State, Trigger};
 use super::{Kind, Offer, Seen, View};
 use crate::uxas::machine::Post;
+use crate::uxas::planners::Planners;
 use crate::uxas::vehicle::Vehicle;
 use crate::uxas::world::World;
 use aldis_envelope::Monotonic;
 use aldis_envelope::lmcp::Object;
 use aldis_envelope::lmcp::cmasi::{Location3D, ServiceStatusType, Task};
+use aldis_envelope::lmcp::route::RoutePlanRequest;
 use aldis_envelope::lmcp::uxtask::{
     TaskAssignmentSummary, TaskImplementationRequest, TaskInitialized, UniqueAutomationRequest,
 };
@@ -27,6 +29,9 @@ pub const TASK_KEY: &str = "TaskID";
 
 /// How many requests of a task may be under way; the oldest is dropped for a newer one.
 const WORKS_MAX: usize = 64;
+
+/// How many answers may be waited for; of requests that are over none comes.
+const WAITING_MAX: usize = 65_536;
 
 /// What the life of a task needs of its surroundings.
 pub struct Context<'a, 'b> {
@@ -47,15 +52,31 @@ pub struct Context<'a, 'b> {
 pub struct Numbers {
     /// The last number given.
     pub last: i64,
-    /// Who waits.
-    pub waiting: BTreeMap<i64, i64>,
+    /// Who waits, and the mailbox of the route planner that was asked.
+    pub waiting: BTreeMap<i64, (i64, Option<&'static str>)>,
+    /// Who answers the mailboxes.
+    pub planners: Planners,
 }
 
 impl Numbers {
     fn next(&mut self, task: i64) -> i64 {
         self.last += 1;
-        self.waiting.insert(self.last, task);
+        if self.waiting.len() >= WAITING_MAX {
+            self.waiting.pop_first();
+        }
+        self.waiting.insert(self.last, (task, None));
         self.last
+    }
+}
+
+impl Context<'_, '_> {
+    /// Asks whoever plans routes for a mailbox.
+    fn ask_planner(&mut self, mailbox: &'static str, request: &RoutePlanRequest) {
+        self.numbers.planners.asked(mailbox, self.post.now().monotonic);
+        if let Some((_, to)) = self.numbers.waiting.get_mut(&request.request_id) {
+            *to = Some(mailbox);
+        }
+        self.post.mail(mailbox, request);
     }
 }
 

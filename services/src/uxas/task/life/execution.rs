@@ -176,7 +176,7 @@ impl Life {
         };
         let sent = Sent { to: target, at_ms: now_ms, asked: Some(request.request_id) };
         self.sent.insert(state.id, sent);
-        context.post.mail(vehicle.medium.mailbox(), &request);
+        context.ask_planner(vehicle.medium.mailbox(), &request);
     }
 
     /// The route after a task that moves has come: it becomes the vehicle's mission. Whether it was one.

@@ -48,7 +48,7 @@ impl Life {
             work.state.step(Trigger::Chosen);
             work.routes.insert(request.request_id, Asked::Final(Box::new(asked.clone())));
         }
-        context.post.mail(vehicle.medium.mailbox(), &request);
+        context.ask_planner(vehicle.medium.mailbox(), &request);
     }
 
     /// Makes the waypoints of the chosen option from its routes.

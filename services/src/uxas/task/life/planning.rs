@@ -166,7 +166,7 @@ impl Life {
         work.offer = Some(offer);
         for (request, choices, mailbox) in requests {
             work.routes.insert(request.request_id, Asked::Options(choices));
-            context.post.mail(mailbox, &request);
+            context.ask_planner(mailbox, &request);
         }
         self.routed(number, context);
     }
@@ -214,6 +214,18 @@ impl Life {
             }
             Some(Asked::Final(asked)) => self.implement(request, &asked, response, context),
             None => {}
+        }
+    }
+
+    /// Nobody answers a request for routes any more.
+    pub fn unrouted(&mut self, number: i64, why: &str, context: &mut Context<'_, '_>) {
+        if let Some(sent) = self.sent.values_mut().find(|sent| sent.asked == Some(number)) {
+            sent.asked = None;
+            return;
+        }
+        let found = self.works.iter().find(|(_, work)| work.routes.contains_key(&number));
+        if let Some(request) = found.map(|(&request, _)| request) {
+            self.fail(request, &format!("task {}: {why}", self.id), context);
         }
     }
 
