@@ -5,31 +5,30 @@
 //! for a topic that somebody writes, a writer for one that somebody reads.
 
 mod config;
-mod forms;
 mod incoming;
 mod outgoing;
 mod presence;
-mod quality;
 mod report;
 mod routes;
 #[cfg(test)]
 mod tests;
+mod topics;
 
-pub use config::{DomainConfig, Pattern, QualityRule};
+pub use config::DomainConfig;
 pub use presence::mark;
-pub use quality::text as quality_in_words;
 pub use report::{DomainStatus, RouteStatus};
 
 use crate::counters::counters;
-use crate::service::domain::{Arrival, DomainEvent, DomainGuid, Endpoint, RouteId};
+use crate::map::dds::{Lost, in_words, mismatches};
+use crate::service::domain::{Arrival, DomainCommand, DomainEvent, DomainGuid, Endpoint, RouteId};
 use crate::service::{Input, Level, Outbox, Service};
 use aldis_envelope::{Now, Prefix, Refusal, aldis};
-use forms::Forms;
 use incoming::Registered;
 use outgoing::Written;
 use presence::Presence;
 use routes::{Routes, Way};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use topics::Topics;
 
 /// How many changes wait for what discovery says of their writer, for each writer: news of it is on its way already.
 const EARLY_MAX: usize = 1_024;
@@ -55,6 +54,8 @@ counters! {
     shed_unannounced,
     /// Changes that another gateway had written.
     echoes_stopped,
+    /// Kinds of what the other version of UMAA cannot say.
+    untranslatable,
     /// Instances that were left by the last who wrote them.
     instances_left,
     /// Endpoints that did not come together with a route.
@@ -65,7 +66,7 @@ counters! {
 /// The bridge of one domain and partition.
 pub struct Domain {
     config: DomainConfig,
-    forms: Forms,
+    topics: Topics,
     endpoints: BTreeMap<DomainGuid, Endpoint>,
     presence: Presence,
     routes: Routes,
@@ -75,8 +76,11 @@ pub struct Domain {
     written: BTreeMap<RouteId, Written>,
     /// Changes of writers that discovery has not told of yet.
     early: BTreeMap<DomainGuid, Vec<(RouteId, Arrival)>>,
+    /// Writers that have just been opened beside others of their address: what is retained comes again, for them.
+    fresh: BTreeSet<RouteId>,
     counters: DomainCounters,
-    subscribed: Vec<Prefix>,
+    /// The addresses of which messages are received.
+    subscribed: BTreeSet<String>,
     congested: bool,
 }
 
@@ -84,7 +88,7 @@ impl Domain {
     /// The bridge, before anything is known of its domain.
     pub fn new(config: DomainConfig) -> Self {
         Self {
-            forms: Forms::new(config.types.clone(), config.exact.clone()),
+            topics: Topics::new(&config),
             presence: Presence::new(&config),
             config,
             endpoints: BTreeMap::new(),
@@ -92,8 +96,9 @@ impl Domain {
             registered: BTreeMap::new(),
             written: BTreeMap::new(),
             early: BTreeMap::new(),
+            fresh: BTreeSet::new(),
             counters: DomainCounters::default(),
-            subscribed: Vec::new(),
+            subscribed: BTreeSet::new(),
             congested: false,
         }
     }
@@ -167,42 +172,71 @@ impl Domain {
     /// Opens and closes routes for those that are there.
     fn route_anew(&mut self, out: &mut Outbox) {
         let wanted = self.wanted();
-        let (opened, closed) = self.routes.change(wanted);
+        let (opened, closed) = self.routes.change(wanted, &mut self.topics);
         for route in closed {
             self.close(route, out);
         }
+        self.topics.keep(&self.routes.topics());
+        let mut again = BTreeSet::new();
         for opening in opened {
-            out.domain(crate::service::domain::DomainCommand::Open(Box::new(opening)));
+            if let Some(route) = self.routes.get(opening.route).filter(|_| opening.writes) {
+                if self.subscribed.contains(&route.address) {
+                    self.fresh.insert(opening.route);
+                    again.insert(route.address.clone());
+                }
+                if route.translated {
+                    self.topics.say_all_again();
+                }
+            }
+            out.domain(DomainCommand::Open(Box::new(opening)));
         }
-        let mut prefixes: Vec<Prefix> = self
-            .routes
-            .all()
-            .filter(|route| route.way == Way::Out)
-            .filter_map(|route| Prefix::new(&forms::address_of(&route.topic)).ok())
-            .collect();
-        prefixes.sort();
-        prefixes.dedup();
-        if prefixes != self.subscribed {
-            self.subscribed.clone_from(&prefixes);
-            out.subscribe(prefixes);
+        let addresses: BTreeSet<String> = self.routes.addresses().map(str::to_owned).collect();
+        if addresses != self.subscribed {
+            out.subscribe(addresses.iter().filter_map(|address| Prefix::new(address).ok()).collect());
+            self.subscribed = addresses;
+        }
+        if !again.is_empty() {
+            out.tell_again(again.iter().filter_map(|address| Prefix::new(address).ok()).collect());
         }
     }
 
-    fn mismatch(&mut self, route: RouteId, policy: &str, out: &mut Outbox) {
+    /// An endpoint does not come together with a route. Those that another route is there for are no trouble of this one.
+    fn mismatch(&mut self, id: RouteId, policy: &str, out: &mut Outbox) {
+        let Some(route) = self.routes.get(id) else { return };
+        let reads = route.way == Way::In;
+        let facing =
+            self.endpoints.values().filter(|endpoint| route.faces(endpoint) && self.is_bridged(endpoint));
+        let (own, others): (Vec<_>, Vec<_>) = facing.partition(|endpoint| route.serves(endpoint));
+        let differ = |endpoint: &&Endpoint| {
+            let (offered, requested) =
+                if reads { (&endpoint.quality, &route.quality) } else { (&route.quality, &endpoint.quality) };
+            mismatches(offered, requested)
+        };
+        let mut found: Vec<String> =
+            own.iter().flat_map(differ).map(|mismatch| mismatch.to_string()).collect();
+        found.sort();
+        found.dedup();
+        if found.is_empty() && !others.is_empty() {
+            return;
+        }
+        if found.is_empty() {
+            let theirs =
+                own.iter().map(|endpoint| in_words(&endpoint.quality)).collect::<Vec<_>>().join("; ");
+            let verb = if reads { "requests" } else { "offers" };
+            found.push(format!(
+                "{policy} does not agree: the bridge {verb} {}, the other side {theirs}",
+                in_words(&route.quality)
+            ));
+        }
         self.counters.mismatches += 1;
-        let Some(found) = self.routes.get(route) else { return };
-        let other =
-            |endpoint: &&Endpoint| endpoint.topic == found.topic && endpoint.writes == (found.way == Way::In);
-        let theirs = self.endpoints.values().filter(other).map(|endpoint| quality::text(&endpoint.quality));
-        let theirs = theirs.collect::<Vec<_>>().join("; ");
-        let text = format!(
-            "{}: {policy} does not agree: the bridge {} {}, the other side {theirs}",
-            found.topic,
-            if found.way == Way::In { "requests" } else { "offers" },
-            quality::text(&found.quality),
-        );
-        if let Some(text) = self.routes.first_trouble(route, &text) {
-            out.note(Level::Warning, text);
+        self.trouble(id, &found.join("; "), out);
+    }
+
+    /// Says what the other version of UMAA cannot, which comes once for each kind.
+    fn lost(&mut self, lost: &[Lost], out: &mut Outbox) {
+        for lost in lost {
+            self.counters.untranslatable += 1;
+            out.note(Level::Warning, lost.to_string());
         }
     }
 }
@@ -213,6 +247,11 @@ impl Service for Domain {
     }
 
     fn handle(&mut self, _: Now, input: Input<'_>, out: &mut Outbox) {
+        if let Input::Again(envelope) = input {
+            self.leaves(envelope, true, out);
+            return;
+        }
+        self.fresh.clear();
         match input {
             Input::Domain(event) => self.domain(event, out),
             Input::Message(envelope) if envelope.message.call.is_some() => {
@@ -223,7 +262,7 @@ impl Service for Domain {
                     out.refuse(envelope, Refusal::NotUnderstood(what));
                 }
             }
-            Input::Message(envelope) => self.leaves(envelope, out),
+            Input::Message(envelope) => self.leaves(envelope, false, out),
             Input::Token(source, false) => self.source_gone(source, out),
             _ => {}
         }

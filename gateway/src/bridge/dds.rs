@@ -33,7 +33,7 @@ pub(crate) struct Endpoint {
 
 /// Quality of service in words.
 pub(crate) fn words(qos: &aldis_dds::Qos) -> String {
-    aldis_services::domain::quality_in_words(&convert::quality(qos))
+    aldis_services::map::dds::in_words(&convert::quality(qos))
 }
 
 /// Takes part in a domain until the node ends. Blocks its thread: Cyclone DDS waits in places.

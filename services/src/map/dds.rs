@@ -1,7 +1,6 @@
 //! A DDS bus and the fleet's: samples as envelopes and back (spec: what bites). Pure; the gateway has the endpoints.
 
 mod newer;
-mod order;
 mod qos;
 mod rules;
 #[cfg(test)]
@@ -10,10 +9,8 @@ mod topic;
 mod version;
 
 pub use newer::{NewerBus, NewerError};
-pub use order::in_order;
-pub use qos::{
-    AccessScope, Durability, History, Mismatch, Ownership, Qos, Reliability, mismatches, offered, requested,
-};
-pub use rules::{Glob, GlobError, Rules};
-pub use topic::{Body, ExportError, Given, ImportError, Imported, Taken, TopicMap, Writer};
+pub use qos::{Mismatch, in_words, mismatches, offered, requested};
+pub use rules::{Glob, GlobError, QualityRule, Rules};
+pub use topic::{Body, ExportError, Given, ImportError, Imported, Sender, Taken, TopicMap, Writer};
+pub use topic::{address_of, topic_of};
 pub use version::{Lost, Outcome, Sample, Translator};

@@ -1,16 +1,54 @@
 //! One topic: its samples as envelopes, and envelopes as its samples.
 
-use aldis_envelope::codec::cdr::{CdrError, KeySchema, Representation, Schema};
+use aldis_envelope::codec::cdr::{CdrError, HEADER, KeySchema, Representation, Schema};
 use aldis_envelope::description::{Extensibility, Library};
 use aldis_envelope::name::NameError;
 use aldis_envelope::umaa::{self, TopicInfo};
-use aldis_envelope::{Change, ContentType, Instance, KeyHash, Label, Message, Name, Source, Wall};
+use aldis_envelope::{Change, ContentType, Group, Instance, KeyHash, Label, Message, Name, Source, Wall};
 use bytes::Bytes;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// How many instances' keys are remembered: 1 000 instances of 48 bytes are 0.1 MB, so this is 10 MB at the most.
 const KEYS_MAX: usize = 100_000;
+
+/// Topics that are not of UMAA stand under this, so that no mailbox has their name.
+const OTHER_TOPICS: &str = "dds::";
+
+/// The address of a topic.
+pub fn address_of(topic: &str) -> String {
+    if topic.starts_with("UMAA::") { topic.to_owned() } else { format!("{OTHER_TOPICS}{topic}") }
+}
+
+/// The topic of an address, if it is one.
+pub fn topic_of(address: &str) -> Option<&str> {
+    if address.starts_with("UMAA::") { Some(address) } else { address.strip_prefix(OTHER_TOPICS) }
+}
+
+/// Who sends on what comes from a bus, and for which group: the bus's partition.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Sender {
+    /// The bridge.
+    pub source: Source,
+    /// The group of its messages.
+    pub group: Group,
+}
+
+impl From<Source> for Sender {
+    /// A bridge of the partition without a name.
+    fn from(source: Source) -> Self {
+        Self { source, group: Group::default() }
+    }
+}
+
+impl Sender {
+    /// The label of a topic's messages.
+    pub(super) fn label(&self, content_type: ContentType, name: &Name) -> Arc<Label> {
+        let mut label = Label::broadcast(content_type, name.clone(), self.source);
+        label.attributes.source_group = self.group.clone();
+        Arc::new(label)
+    }
+}
 
 /// A writer on the bus, by its GUID.
 pub type Writer = [u8; 16];
@@ -54,7 +92,7 @@ pub struct Given {
     /// What it does to its instance.
     pub change: Change,
     /// All of it where it is put, its key alone otherwise; header included.
-    pub bytes: Vec<u8>,
+    pub bytes: Bytes,
 }
 
 /// Why a sample does not enter.
@@ -163,28 +201,31 @@ pub struct TopicMap {
 }
 
 impl TopicMap {
-    /// A topic of Support Operations in version 5.2.1 becomes `umaa` contents, every other stays `cdr`. `source` is the bridge's.
-    /// A type that the library lacks or that is mutable is carried as it is.
+    /// A topic of Support Operations in version 5.2.1 becomes `umaa` contents, every other stays `cdr`. A type that the library lacks or
+    /// that is mutable is carried as it is.
     ///
     /// # Errors
     /// [`NameError`] where the topic's name is none that an envelope can have.
-    pub fn new(topic: &str, type_name: &str, library: &Library, source: Source) -> Result<Self, NameError> {
-        let name = Name::new(topic)?;
-        let label = |content_type| Arc::new(Label::broadcast(content_type, name.clone(), source));
+    pub fn new(topic: &str, type_name: &str, library: &Library, sender: &Sender) -> Result<Self, NameError> {
+        let name = Name::new(&address_of(topic))?;
         let schema = Schema::new(library, type_name).ok();
         let shapes = schema.map(|schema| {
             let closed = schema.as_final();
             [Shape::new(schema), Shape::new(closed)]
         });
-        let info = umaa::topic(topic).filter(|info| info.type_name == type_name);
         Ok(Self {
             name: topic.to_owned(),
-            ours: label(ContentType::Umaa),
-            theirs: label(ContentType::Cdr),
+            ours: sender.label(ContentType::Umaa, &name),
+            theirs: sender.label(ContentType::Cdr, &name),
             shapes,
-            info,
+            info: umaa::topic(topic).filter(|info| info.type_name == type_name),
             keys: BTreeMap::new(),
         })
+    }
+
+    /// The same for a type that has its name of Support Operations and is another: all of it stays `cdr`.
+    pub fn as_it_comes(self) -> Self {
+        Self { info: None, ..self }
     }
 
     /// The topic's name.
@@ -217,6 +258,31 @@ impl TopicMap {
         message.change = taken.change;
         message.instance = instance.map(Arc::new);
         Ok(Imported { message, source_time: taken.source_time })
+    }
+
+    /// The envelope that ends an instance.
+    pub fn end(&self, change: Change, instance: Arc<Instance>) -> Message {
+        Message { change, instance: Some(instance), ..Message::new(self.ending(), Bytes::new()) }
+    }
+
+    /// The key of a whole sample, as a sample that holds it alone; none where its type has none.
+    ///
+    /// # Errors
+    /// [`ExportError::NoSample`] where it is none.
+    pub fn key_sample(
+        &self,
+        sample: &[u8],
+        representation: Representation,
+    ) -> Result<Option<Bytes>, ExportError> {
+        let Some((shape, keys)) = self.shape_of(sample).and_then(|shape| Some((shape, shape.keys.as_ref()?)))
+        else {
+            return Ok(None);
+        };
+        let no_sample = |why| ExportError::NoSample { topic: self.name.clone(), why };
+        let Some(key) = keys.of_sample(&shape.schema, sample).map_err(no_sample)?.key else {
+            return Ok(None);
+        };
+        keys.key_sample(&key, representation).map(|bytes| Some(bytes.into())).map_err(no_sample)
     }
 
     /// The label of messages without a content: that of what the topic's contents usually are.
@@ -312,7 +378,7 @@ impl TopicMap {
             .key_sample(&key, representation)
             .map_err(|why| ExportError::NoSample { topic: topic(), why })?;
         self.note(change, Some(instance));
-        Ok(Given { change, bytes })
+        Ok(Given { change, bytes: bytes.into() })
     }
 
     fn shape_for(&self, representation: Representation) -> Option<&Shape> {
@@ -320,19 +386,21 @@ impl TopicMap {
         self.shape_of(&[high, low])
     }
 
-    fn written(&self, message: &Message, representation: Representation) -> Result<Vec<u8>, ExportError> {
+    fn written(&self, message: &Message, representation: Representation) -> Result<Bytes, ExportError> {
         let topic = || self.name.clone();
         let no_sample = |why| ExportError::NoSample { topic: topic(), why };
         let unknown = || ExportError::UnknownType { topic: topic() };
-        match &message.label.attributes.content_type {
+        let bytes = match &message.label.attributes.content_type {
             ContentType::Umaa => {
                 let shape = self.shape_for(representation).ok_or_else(unknown)?;
-                shape.schema.of_postcard(&message.content, representation).map_err(no_sample)
+                shape.schema.of_postcard(&message.content, representation).map_err(no_sample)?
             }
             ContentType::Cdr => {
-                let id = representation.id().to_be_bytes();
-                if message.content.starts_with(&id) {
-                    return Ok(message.content.to_vec());
+                let head = message.content.first_chunk::<HEADER>();
+                let found =
+                    head.and_then(|head| Representation::of_id(u16::from_be_bytes([head[0], head[1]])));
+                if found.is_some_and(|found| found.form == representation.form) {
+                    return Ok(message.content.clone());
                 }
                 // Another representation than the writer's: read by the one, written by the other.
                 let shape = self.shape_of(&message.content).ok_or_else(unknown)?;
@@ -341,9 +409,10 @@ impl TopicMap {
                     return Err(ExportError::OtherVersion { topic: topic() });
                 }
                 let wanted = self.shape_for(representation).ok_or_else(unknown)?;
-                wanted.schema.write(&sample.value, representation).map_err(no_sample)
+                wanted.schema.write(&sample.value, representation).map_err(no_sample)?
             }
-            other => Err(ExportError::OtherContent { topic: topic(), found: format!("{other:?}") }),
-        }
+            other => return Err(ExportError::OtherContent { topic: topic(), found: format!("{other:?}") }),
+        };
+        Ok(bytes.into())
     }
 }
