@@ -224,16 +224,16 @@ pub(crate) fn bench_types() -> Arc<Library> {
     Arc::new(with_bench_type(&Library::default()))
 }
 
-/// The types of both versions, and of a folder.
+/// The types of a version, and of a folder.
 #[cfg(feature = "dds")]
-pub(crate) fn dds_types(folder: Option<&Path>) -> Result<Arc<Library>, String> {
-    let (older, _) = built_in(DdsVersion::V5_2_1);
-    let Some(folder) = folder else { return Ok(older) };
+pub(crate) fn dds_types(version: DdsVersion, folder: Option<&Path>) -> Result<Arc<Library>, String> {
+    let (own, _) = built_in(version);
+    let Some(folder) = folder else { return Ok(own) };
     let mut files = BTreeMap::new();
     idl_files(folder, folder, &mut files).map_err(|why| format!("{}: {why}", folder.display()))?;
     let idl = aldis_envelope::idl::parse(&files, Extensibility::Appendable);
     let idl = idl.map_err(|errors| errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))?;
-    both(&idl.library, &older).map(Arc::new)
+    both(&idl.library, &own).map(Arc::new)
 }
 
 /// The types that every program knows, and the names of those that topics have.
