@@ -4,6 +4,7 @@
 //! gets what the other side has. **Routes** are its own readers and writers in the domain, opened by what discovery finds: a reader
 //! for a topic that somebody writes, a writer for one that somebody reads.
 
+mod agreement;
 mod config;
 mod incoming;
 mod outgoing;
@@ -19,14 +20,14 @@ pub use presence::mark;
 pub use report::{DomainStatus, RouteStatus};
 
 use crate::counters::counters;
-use crate::map::dds::{Lost, in_words, mismatches};
+use crate::map::dds::Lost;
 use crate::service::domain::{Arrival, DomainCommand, DomainEvent, DomainGuid, Endpoint, RouteId};
 use crate::service::{Input, Level, Outbox, Service};
-use aldis_envelope::{Now, Prefix, Refusal, aldis};
+use aldis_envelope::{Monotonic, Now, Prefix, Refusal, aldis};
 use incoming::Registered;
 use outgoing::Written;
 use presence::Presence;
-use routes::{Routes, Way};
+use routes::Routes;
 use std::collections::{BTreeMap, BTreeSet};
 use topics::Topics;
 
@@ -78,6 +79,8 @@ pub struct Domain {
     early: BTreeMap<DomainGuid, Vec<(RouteId, Arrival)>>,
     /// Writers that have just been opened beside others of their address: what is retained comes again, for them.
     fresh: BTreeSet<RouteId>,
+    /// By route: a policy that keeps some endpoint away, of which discovery may still tell, and until when.
+    unexplained: BTreeMap<RouteId, (Monotonic, String)>,
     counters: DomainCounters,
     /// The addresses of which messages are received.
     subscribed: BTreeSet<String>,
@@ -97,13 +100,14 @@ impl Domain {
             written: BTreeMap::new(),
             early: BTreeMap::new(),
             fresh: BTreeSet::new(),
+            unexplained: BTreeMap::new(),
             counters: DomainCounters::default(),
             subscribed: BTreeSet::new(),
             congested: false,
         }
     }
 
-    fn domain(&mut self, event: DomainEvent, out: &mut Outbox) {
+    fn domain(&mut self, now: Now, event: DomainEvent, out: &mut Outbox) {
         match event {
             DomainEvent::Joined => {}
             DomainEvent::Endpoint(endpoint) => self.endpoint(*endpoint, out),
@@ -133,7 +137,7 @@ impl Domain {
                 self.early.remove(&writer);
                 self.writer_gone(route, writer, autodispose, out);
             }
-            DomainEvent::Mismatch(route, policy) => self.mismatch(route, &policy, out),
+            DomainEvent::Mismatch(route, policy) => self.mismatch(now, route, policy, out),
             DomainEvent::Refused(route, why) => {
                 self.counters.refused_write += 1;
                 if let Some(text) = self.routes.first_trouble(route, &why) {
@@ -200,38 +204,6 @@ impl Domain {
         }
     }
 
-    /// An endpoint does not come together with a route. Those that another route is there for are no trouble of this one.
-    fn mismatch(&mut self, id: RouteId, policy: &str, out: &mut Outbox) {
-        let Some(route) = self.routes.get(id) else { return };
-        let reads = route.way == Way::In;
-        let facing =
-            self.endpoints.values().filter(|endpoint| route.faces(endpoint) && self.is_bridged(endpoint));
-        let (own, others): (Vec<_>, Vec<_>) = facing.partition(|endpoint| route.serves(endpoint));
-        let differ = |endpoint: &&Endpoint| {
-            let (offered, requested) =
-                if reads { (&endpoint.quality, &route.quality) } else { (&route.quality, &endpoint.quality) };
-            mismatches(offered, requested)
-        };
-        let mut found: Vec<String> =
-            own.iter().flat_map(differ).map(|mismatch| mismatch.to_string()).collect();
-        found.sort();
-        found.dedup();
-        if found.is_empty() && !others.is_empty() {
-            return;
-        }
-        if found.is_empty() {
-            let theirs =
-                own.iter().map(|endpoint| in_words(&endpoint.quality)).collect::<Vec<_>>().join("; ");
-            let verb = if reads { "requests" } else { "offers" };
-            found.push(format!(
-                "{policy} does not agree: the bridge {verb} {}, the other side {theirs}",
-                in_words(&route.quality)
-            ));
-        }
-        self.counters.mismatches += 1;
-        self.trouble(id, &found.join("; "), out);
-    }
-
     /// Says what the other version of UMAA cannot, which comes once for each kind.
     fn lost(&mut self, lost: &[Lost], out: &mut Outbox) {
         for lost in lost {
@@ -246,14 +218,19 @@ impl Service for Domain {
         true
     }
 
-    fn handle(&mut self, _: Now, input: Input<'_>, out: &mut Outbox) {
+    fn next_deadline(&self) -> Option<Monotonic> {
+        self.unexplained.values().map(|(until, _)| *until).min()
+    }
+
+    fn handle(&mut self, now: Now, input: Input<'_>, out: &mut Outbox) {
         if let Input::Again(envelope) = input {
             self.leaves(envelope, true, out);
             return;
         }
         self.fresh.clear();
         match input {
-            Input::Domain(event) => self.domain(event, out),
+            Input::Domain(event) => self.domain(now, event, out),
+            Input::Deadline => self.explain(now, out),
             Input::Message(envelope) if envelope.message.call.is_some() => {
                 if envelope.message.label.descriptor() == aldis::DOMAIN_QUERY {
                     self.report(envelope, out);

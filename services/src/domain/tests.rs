@@ -5,7 +5,9 @@ use crate::map::dds::Rules;
 use crate::service::domain::{DomainCommand, Durable, Opening, Quality, Sending, Xcdr};
 use crate::service::{Action, Outbox, Service};
 use aldis_envelope::description::{Definition, Draft, Extensibility, Member, Structure, Type};
-use aldis_envelope::{BootId, Change, ContentType, Envelope, Fleet, Message, Priority, Source, Stamp, Wall};
+use aldis_envelope::{
+    BootId, Change, ContentType, Envelope, Fleet, Message, Monotonic, Now, Priority, Source, Stamp, Wall,
+};
 use bytes::Bytes;
 use std::sync::Arc;
 
@@ -252,13 +254,23 @@ fn who_differs_in_what_it_requests_is_told_and_who_has_a_route_of_its_own_is_not
         let text = |action| if let Action::Note(note) = action { Some(note.text) } else { None };
         actions.into_iter().filter_map(text).collect::<Vec<_>>()
     };
-    let mismatch = || DomainEvent::Mismatch(route, "TYPE_CONSISTENCY_ENFORCEMENT".into());
-    assert_eq!(notes(stage.give(mismatch())), [""; 0], "another route is there for it");
+    let mismatch = |policy: &str| DomainEvent::Mismatch(route, policy.to_owned());
+    let later = |stage: &mut Stage, seconds| {
+        let now = Now {
+            monotonic: Monotonic::START + std::time::Duration::from_secs(seconds),
+            ..Default::default()
+        };
+        stage.domain.handle(now, Input::Deadline, &mut stage.out);
+        stage.out.drain().collect::<Vec<_>>()
+    };
+    assert_eq!(notes(stage.give(mismatch("TYPE_CONSISTENCY_ENFORCEMENT"))), [""; 0]);
+    assert_eq!(notes(later(&mut stage, 3)), [""; 0], "another route is there for it");
+    assert_eq!(notes(stage.give(mismatch("DURABILITY"))), [""; 0], "discovery has not told of it yet");
     let DomainEvent::Endpoint(mut strict) = endpoint(guid(3, 1), false, "Plain") else { unreachable!() };
     strict.quality.durable = Durable::Persistent;
     stage.give(DomainEvent::Endpoint(strict));
-    let told = notes(stage.give(mismatch()));
-    assert_eq!(told, ["Plain: DURABILITY: TRANSIENT_LOCAL is offered, PERSISTENT requested"]);
-    assert_eq!(notes(stage.give(mismatch())), [""; 0], "it is told once");
-    assert_eq!(stage.domain.counters.mismatches, 2);
+    let told = ["Plain: DURABILITY: TRANSIENT_LOCAL is offered, PERSISTENT requested"];
+    assert_eq!(notes(later(&mut stage, 6)), told);
+    assert_eq!(notes(stage.give(mismatch("DURABILITY"))), [""; 0], "it is told once");
+    assert_eq!((stage.domain.counters.mismatches, stage.domain.next_deadline()), (2, None));
 }

@@ -143,8 +143,8 @@ class Peer:
         wanted = qos(given, False)
         reader = DataReader(Subscriber(self.participant, wanted), Topic(self.participant, topic, kind), wanted)
         self.readers[topic] = reader
-        threading.Thread(target=self.follow, args=(topic, reader), daemon=True).start()
         say(["reader", topic])
+        threading.Thread(target=self.follow, args=(topic, reader), daemon=True).start()
 
     def follow(self, topic, reader):
         waits = WaitSet(self.participant)

@@ -1,14 +1,13 @@
 //! Topics that are not UMAA's; what does not come together, and what must not.
 
-use crate::peer::Stage;
+use crate::peer::{Peer, Stage};
 use crate::{APPENDABLE, HEALTH, health};
-use serde_json::json;
+use serde_json::{Value, json};
 
 const IDL: &str = "module plant {
   union Value switch (long) { case 1: double number; case 2: string<64> text; };
   struct Place { @key long row; string<32> label; };
   struct Reading { @key Place place; Value value; @optional double error; long count; };
-  const string readingsTopic = \"plant/readings\";
 };
 ";
 const READINGS: &str = "plant/readings";
@@ -16,27 +15,37 @@ const READINGS: &str = "plant/readings";
 #[test]
 fn a_topic_of_an_idl_folder_crosses_both_ways_with_its_ends() {
     let Some(stage) = Stage::with_idl(IDL) else { return };
-    for (from, to) in [(0, 1), (1, 0)] {
-        for form in ["final", "appendable"] {
-            let kind = format!("plant {form}");
-            let (mut writer, mut reader) = (stage.peer(from), stage.peer(to));
-            writer.writer(READINGS, &kind, json!({}));
-            reader.reader(READINGS, &kind, json!({"keep_all": true}));
-            reader.matched(READINGS, 1);
-            let place = |row: i64| json!({"row": row, "label": "hall"});
-            let first = json!({"place": place(1), "value": {"text": "wet"}, "error": null, "count": 7});
-            let second = json!({"place": place(2), "value": {"number": 1.5}, "error": 0.25, "count": 8});
-            writer.change("write", READINGS, first.clone(), 10);
-            writer.change("write", READINGS, second.clone(), 20);
-            let mut heard = reader.changes(2, |line| line[2].clone());
-            heard.sort_by_key(|(_, sample)| sample["count"].as_i64());
-            assert_eq!(heard, [("alive".to_owned(), first), ("alive".to_owned(), second)]);
-            writer.change("dispose", READINGS, json!({"place": place(1)}), 30);
-            writer.change("unregister", READINGS, json!({"place": place(2)}), 40);
-            let mut ends = reader.changes(2, |line| line[2]["place"]["row"].clone());
-            ends.sort_by_key(|(state, _)| state.clone());
-            assert_eq!(ends, [("disposed".to_owned(), json!(1)), ("no_writers".to_owned(), json!(2))]);
-        }
+    let turns = [(0, 1, "final"), (1, 0, "final"), (0, 1, "appendable"), (1, 0, "appendable")];
+    for (turn, (from, to, form)) in (0..).zip(turns) {
+        let kind = format!("plant {form}");
+        let (mut writer, mut reader) = (stage.peer(from), stage.peer(to));
+        writer.writer(READINGS, &kind, json!({}));
+        reader.reader(READINGS, &kind, json!({"keep_all": true}));
+        reader.matched(READINGS, 1);
+        let place = |row: i64| json!({"row": 10 * turn + row, "label": "hall"});
+        let first = json!({"place": place(1), "value": {"text": "wet"}, "error": null, "count": 7});
+        let second = json!({"place": place(2), "value": {"number": 1.5}, "error": 0.25, "count": 8});
+        writer.change("write", READINGS, first.clone(), 10);
+        writer.change("write", READINGS, second.clone(), 20);
+        // Who comes late hears of what has ended before, too.
+        let two = |reader: &Peer| {
+            let is_of_turn =
+                |line: &Value| line[2]["place"]["row"].as_i64().is_some_and(|row| row / 10 == turn);
+            std::iter::repeat_with(|| reader.next()).filter(is_of_turn).take(2).collect::<Vec<_>>()
+        };
+        let said =
+            |line: &Value, what: &Value| (line[1].as_str().unwrap_or_default().to_owned(), what.clone());
+        let mut heard: Vec<_> = two(&reader).iter().map(|line| said(line, &line[2])).collect();
+        heard.sort_by_key(|(_, sample)| sample["count"].as_i64());
+        assert_eq!(heard, [("alive".to_owned(), first), ("alive".to_owned(), second)]);
+        writer.change("dispose", READINGS, json!({"place": place(1)}), 30);
+        writer.change("unregister", READINGS, json!({"place": place(2)}), 40);
+        let mut ends: Vec<_> = two(&reader).iter().map(|line| said(line, &line[2]["place"]["row"])).collect();
+        ends.sort_by_key(|(state, _)| state.clone());
+        assert_eq!(
+            ends,
+            [("disposed".to_owned(), json!(10 * turn + 1)), ("no_writers".to_owned(), json!(10 * turn + 2))]
+        );
     }
 }
 

@@ -152,6 +152,19 @@ impl Case {
     }
 }
 
+/// As text, the same for the same members in whatever order.
+fn text(value: &Value) -> String {
+    match value {
+        Value::Object(members) => {
+            let members: std::collections::BTreeMap<_, _> =
+                members.iter().map(|(name, value)| (name, text(value))).collect();
+            format!("{members:?}")
+        }
+        Value::Array(elements) => format!("{:?}", elements.iter().map(text).collect::<Vec<_>>()),
+        other => other.to_string(),
+    }
+}
+
 /// The next lines of samples of one way, in an order of their own: each topic has a thread in the peer.
 fn hears(peer: &Peer, sources: [u8; 2], count: usize) -> Vec<String> {
     let is_ours = |line: &Value| {
@@ -160,7 +173,7 @@ fn hears(peer: &Peer, sources: [u8; 2], count: usize) -> Vec<String> {
         sources.iter().any(|own| *found == id(*own))
     };
     let lines = std::iter::repeat_with(|| peer.any()).filter(is_ours).take(count);
-    let mut heard: Vec<_> = lines.map(|line| json!([line[0], line[1], line[2]]).to_string()).collect();
+    let mut heard: Vec<_> = lines.map(|line| text(&json!([line[0], line[1], line[2]]))).collect();
     heard.sort();
     heard
 }
@@ -181,7 +194,7 @@ fn crosses(
             writer.tell(&json!(["write", case.topic, sample, at + 1]));
         }
     }
-    let put = |case: &Case, sample: &Value| json!([case.topic, "alive", sample]).to_string();
+    let put = |case: &Case, sample: &Value| text(&json!([case.topic, "alive", sample]));
     let expected = to.iter().flat_map(|case| [put(case, &case.full), put(case, &case.sparse)]);
     let expected = sorted(expected.collect());
     for reader in readers {
@@ -193,7 +206,7 @@ fn crosses(
     }
     let ends = to.iter().flat_map(|case| {
         [("disposed", &case.full), ("no_writers", &case.sparse)]
-            .map(|(state, sample)| json!([case.topic, state, case.key(sample)]).to_string())
+            .map(|(state, sample)| text(&json!([case.topic, state, case.key(sample)])))
     });
     let expected = sorted(ends.collect());
     for reader in readers {

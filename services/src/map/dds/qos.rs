@@ -19,7 +19,7 @@ fn of_topic(topic: &str, rules: &[QualityRule], partition: &str) -> Quality {
     let all = matches!(pattern, Some(Pattern::Status | Pattern::Log | Pattern::Element));
     let mut quality = Quality {
         reliable: true,
-        durable: if pattern == Some(Pattern::Log) { Durable::Volatile } else { Durable::TransientLocal },
+        durable: Durable::TransientLocal,
         keep_last: (!all).then_some(1),
         samples_max: None,
         exclusive: false,
@@ -41,14 +41,22 @@ fn of_topic(topic: &str, rules: &[QualityRule], partition: &str) -> Quality {
     quality
 }
 
+/// Whether a configuration says how long samples of a topic last.
+fn is_ruled(topic: &str, rules: &[QualityRule]) -> bool {
+    rules.iter().find(|rule| rule.topics.matches(topic)).is_some_and(|rule| rule.durable.is_some())
+}
+
 /// What a reader of ours requests of a topic: no more than the writers offer. It hands on what comes, in its writers' order, and so asks
 /// for none of it to be kept or put in order.
 pub fn requested(topic: &str, rules: &[QualityRule], partition: &str, writers: &[&Quality]) -> Quality {
     let base = of_topic(topic, rules, partition);
+    // Entries of a log that are past are nobody's news, though a writer may keep them.
+    let is_log = Pattern::of(topic) == Some(Pattern::Log) && !is_ruled(topic, rules);
+    let needed = if is_log { Durable::Volatile } else { base.durable };
     let durable = writers.iter().map(|offer| offer.durable).min().unwrap_or_default();
     Quality {
         reliable: base.reliable && writers.iter().all(|offer| offer.reliable),
-        durable: durable.min(base.durable),
+        durable: durable.min(needed),
         access: 0,
         ordered: false,
         by_source_time: false,
@@ -220,7 +228,7 @@ mod tests {
     fn what_we_offer_matches_what_vendors_request_and_what_we_request_what_they_offer() {
         for topic in TOPICS {
             let own = offered(topic, &[], "", &[], Xcdr::V2);
-            let durable = if topic.contains("Log") { Durable::Volatile } else { Durable::TransientLocal };
+            let durable = Durable::TransientLocal;
             let strict = Quality { durable, deadline_ns: Some(9), lease_ns: Some(5), ..own.clone() };
             let own = offered(topic, &[], "", &[&strict], Xcdr::V2);
             assert_eq!(mismatches(&own, &strict), [], "{topic}");
@@ -237,6 +245,8 @@ mod tests {
             };
             assert_eq!(mismatches(&weak, &requested(topic, &[], "", &[&weak])), [], "{topic}");
         }
+        let asked = |topic| requested(topic, &[], "", &[&offered(topic, &[], "", &[], Xcdr::V2)]).durable;
+        assert_eq!((asked(TOPICS[4]), asked(TOPICS[0])), (Durable::Volatile, Durable::TransientLocal));
         assert_eq!(offered(TOPICS[1], &[], "", &[], Xcdr::V2).keep_last, Some(500));
         assert_eq!(offered(TOPICS[0], &[], "", &[], Xcdr::V2).keep_last, Some(1));
         let rule = QualityRule {
