@@ -138,7 +138,7 @@ impl Domain {
             self.send(message, at, out);
             return;
         }
-        match self.topics.to_fleet(&route.topic, &message) {
+        match self.topics.for_fleet(&route.topic, &message) {
             Ok((messages, lost)) => {
                 self.lost(&lost, out);
                 for message in messages {

@@ -36,12 +36,19 @@ impl Domain {
         let wanted = |id: &&RouteId| !again || self.fresh.contains(id);
         let routes: Vec<RouteId> = routes.iter().filter(wanted).copied().collect();
         let Some(&first) = routes.first() else { return };
-        let why = if self.routes.get(first).is_some_and(|route| route.translated) {
-            self.write_translated(&routes, envelope, out)
+        if self.routes.get(first).is_some_and(|route| route.translated) {
+            let written = self.write_translated(&routes, envelope, out);
+            self.refuses(written, envelope, out);
         } else {
-            routes.iter().map(|&id| self.write(id, envelope, out).map_err(|why| (id, why))).collect()
-        };
-        if let Err((id, why)) = why {
+            for id in routes {
+                let written = self.write(id, envelope, out).map_err(|why| (id, why));
+                self.refuses(written, envelope, out);
+            }
+        }
+    }
+
+    fn refuses(&mut self, written: Result<(), (RouteId, String)>, envelope: &Envelope, out: &mut Outbox) {
+        if let Err((id, why)) = written {
             self.counters.refused_malformed += 1;
             let source = envelope.message.label.source();
             self.trouble(id, &format!("a message of {source} is refused: {why}"), out);
@@ -76,7 +83,7 @@ impl Domain {
         envelope: &Envelope,
         out: &mut Outbox,
     ) -> Result<(), (RouteId, String)> {
-        let (samples, lost) = self.topics.to_bus(&envelope.message).map_err(|why| (routes[0], why))?;
+        let (samples, lost) = self.topics.for_bus(&envelope.message).map_err(|why| (routes[0], why))?;
         self.lost(&lost, out);
         for sample in &samples {
             for &id in routes {

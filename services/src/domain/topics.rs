@@ -95,19 +95,19 @@ impl Topics {
     }
 
     /// What the fleet is told of a change of a topic of 6.0, and what is lost.
-    pub(super) fn to_fleet(
+    pub(super) fn for_fleet(
         &mut self,
         topic: &str,
         came: &Message,
     ) -> Result<(Vec<Message>, Vec<Lost>), String> {
         let Some(bus) = &mut self.newer else { return Ok(Default::default()) };
-        bus.to_fleet(topic, came).map_err(|why| why.to_string())
+        bus.for_fleet(topic, came).map_err(|why| why.to_string())
     }
 
     /// What a message of the fleet is on a bus of 6.0, and what is lost.
-    pub(super) fn to_bus(&mut self, message: &Message) -> Result<(Vec<Sample>, Vec<Lost>), String> {
+    pub(super) fn for_bus(&mut self, message: &Message) -> Result<(Vec<Sample>, Vec<Lost>), String> {
         let Some(bus) = &mut self.newer else { return Ok(Default::default()) };
-        bus.to_bus(message).map_err(|why| why.to_string())
+        bus.for_bus(message).map_err(|why| why.to_string())
     }
 
     pub(super) fn newer(&self) -> Option<&NewerBus> {

@@ -1,6 +1,6 @@
 //! A bus that speaks version 6.0: its samples as the envelopes of 5.2.1 that the fleet knows, and back.
 
-use super::topic::malformed;
+use super::error::malformed;
 use super::version::{Lost, Sample, Translator};
 use super::{ExportError, Given, ImportError, Sender};
 use aldis_envelope::codec::cdr::{CdrError, KeySchema, Representation, Schema, SchemaError, Value};
@@ -101,7 +101,7 @@ impl NewerBus {
     ///
     /// # Errors
     /// [`ImportError`] where it is no sample of its type.
-    pub fn to_fleet(
+    pub fn for_fleet(
         &mut self,
         topic: &str,
         came: &Message,
@@ -147,7 +147,7 @@ impl NewerBus {
     ///
     /// # Errors
     /// [`ExportError`] where its content is no sample of its topic, or it ends an instance of which the key is not known.
-    pub fn to_bus(&mut self, message: &Message) -> Result<(Vec<Sample>, Vec<Lost>), ExportError> {
+    pub fn for_bus(&mut self, message: &Message) -> Result<(Vec<Sample>, Vec<Lost>), ExportError> {
         let topic = message.label.descriptor();
         let no_sample = |why: Box<CdrError>| ExportError::NoSample { topic: topic.to_owned(), why };
         let Some(older) = self.older.get(topic) else {
@@ -191,7 +191,7 @@ impl NewerBus {
     /// The bytes of a sample of 6.0 for a writer of this representation, and its instance.
     ///
     /// # Errors
-    /// [`ExportError::NoSample`] where it is none, which a test rules out for what [`Self::to_bus`] makes.
+    /// [`ExportError::NoSample`] where it is none, which a test rules out for what [`Self::for_bus`] makes.
     pub fn given(
         &self,
         sample: &Sample,
@@ -248,14 +248,14 @@ mod tests {
         let plain = Representation::xcdr2(Extensibility::Final);
         for representation in [Representation::XCDR1, plain, Representation::xcdr2(BETWEEN)] {
             for message in [&put, &cancel] {
-                let (samples, lost) = bus.to_bus(message).unwrap();
+                let (samples, lost) = bus.for_bus(message).unwrap();
                 assert_eq!((samples.len(), lost, samples[0].topic.as_str()), (1, vec![], name));
                 let (instance, Given { change, bytes }) = bus.given(&samples[0], representation).unwrap();
                 let body = if change == Change::Put { Body::Sample(bytes) } else { Body::Key(bytes) };
                 let taken = Taken { writer: [1; 16], source_time: Wall(5), change, body };
                 let native = map.import(&taken).unwrap().message;
                 assert_eq!(native.instance.as_deref(), instance.as_ref());
-                let (came, lost) = bus.to_fleet(name, &native).unwrap();
+                let (came, lost) = bus.for_fleet(name, &native).unwrap();
                 assert_eq!((came, lost), (vec![message.clone()], vec![]));
             }
         }
@@ -263,7 +263,7 @@ mod tests {
             Arc::new(Label::broadcast(ContentType::Cdr, Name::new("X").unwrap(), source)),
             Bytes::new(),
         );
-        assert_eq!(bus.to_bus(&other).unwrap().1, [Lost::Topic("X".to_owned())]);
+        assert_eq!(bus.for_bus(&other).unwrap().1, [Lost::Topic("X".to_owned())]);
         assert_eq!(
             (bus.older_topic(name), bus.older_topic("X")),
             (Some(name.strip_suffix("Type").unwrap()), None)

@@ -1,54 +1,18 @@
 //! One topic: its samples as envelopes, and envelopes as its samples.
 
-use aldis_envelope::codec::cdr::{CdrError, HEADER, KeySchema, Representation, Schema};
+use super::error::{ExportError, ImportError, malformed};
+use super::sender::{Sender, address_of};
+use aldis_envelope::codec::cdr::{HEADER, KeySchema, Representation, Schema};
 use aldis_envelope::description::{Extensibility, Library};
 use aldis_envelope::name::NameError;
 use aldis_envelope::umaa::{self, TopicInfo};
-use aldis_envelope::{Change, ContentType, Group, Instance, KeyHash, Label, Message, Name, Source, Wall};
+use aldis_envelope::{Change, ContentType, Instance, KeyHash, Label, Message, Name, Wall};
 use bytes::Bytes;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// How many instances' keys are remembered: 1 000 instances of 48 bytes are 0.1 MB, so this is 10 MB at the most.
 const KEYS_MAX: usize = 100_000;
-
-/// Topics that are not of UMAA stand under this, so that no mailbox has their name.
-const OTHER_TOPICS: &str = "dds::";
-
-/// The address of a topic.
-pub fn address_of(topic: &str) -> String {
-    if topic.starts_with("UMAA::") { topic.to_owned() } else { format!("{OTHER_TOPICS}{topic}") }
-}
-
-/// The topic of an address, if it is one.
-pub fn topic_of(address: &str) -> Option<&str> {
-    if address.starts_with("UMAA::") { Some(address) } else { address.strip_prefix(OTHER_TOPICS) }
-}
-
-/// Who sends on what comes from a bus, and for which group: the bus's partition.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Sender {
-    /// The bridge.
-    pub source: Source,
-    /// The group of its messages.
-    pub group: Group,
-}
-
-impl From<Source> for Sender {
-    /// A bridge of the partition without a name.
-    fn from(source: Source) -> Self {
-        Self { source, group: Group::default() }
-    }
-}
-
-impl Sender {
-    /// The label of a topic's messages.
-    pub(super) fn label(&self, content_type: ContentType, name: &Name) -> Arc<Label> {
-        let mut label = Label::broadcast(content_type, name.clone(), self.source);
-        label.attributes.source_group = self.group.clone();
-        Arc::new(label)
-    }
-}
 
 /// A writer on the bus, by its GUID.
 pub type Writer = [u8; 16];
@@ -93,85 +57,6 @@ pub struct Given {
     pub change: Change,
     /// All of it where it is put, its key alone otherwise; header included.
     pub bytes: Bytes,
-}
-
-/// Why a sample does not enter.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum ImportError {
-    /// Its bytes are no sample of the type.
-    #[error("a sample of {topic} is malformed: {why}")]
-    Malformed {
-        /// The topic.
-        topic: String,
-        /// What is wrong.
-        why: Box<CdrError>,
-    },
-    /// An instance ends of which the key was never told.
-    #[error(
-        "an instance of {topic} ends, of which only the key hash {hash} is told: have its writer send serialized keys"
-    )]
-    UnknownKey {
-        /// The topic.
-        topic: String,
-        /// The hash.
-        hash: KeyHash,
-    },
-    /// The type is not known, so that its keys cannot be read.
-    #[error(
-        "the type of {topic} is not known: give its IDL by `idl`, or have its writer send type information"
-    )]
-    UnknownType {
-        /// The topic.
-        topic: String,
-    },
-}
-
-/// Why an envelope does not leave.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum ExportError {
-    /// Its content is not of the topic's type.
-    #[error("a content is no sample of {topic}: {why}")]
-    NoSample {
-        /// The topic.
-        topic: String,
-        /// What is wrong.
-        why: Box<CdrError>,
-    },
-    /// Its content is in no form that a topic has.
-    #[error("a content of type {found} on {topic}: `umaa` and `cdr` are written")]
-    OtherContent {
-        /// The topic.
-        topic: String,
-        /// The type.
-        found: String,
-    },
-    /// An instance ends of which the key is not known.
-    #[error("an instance of {topic} ends, of which only the key hash {hash} is known")]
-    UnknownKey {
-        /// The topic.
-        topic: String,
-        /// The hash; of no instance where there is none.
-        hash: KeyHash,
-    },
-    /// Writing it anew would lose what its type has more.
-    #[error(
-        "a sample of {topic} has other members than its type here, so it leaves in its own representation alone"
-    )]
-    OtherVersion {
-        /// The topic.
-        topic: String,
-    },
-    /// The type is not known.
-    #[error("the type of {topic} is not known here, so its samples leave only as they came")]
-    UnknownType {
-        /// The topic.
-        topic: String,
-    },
-}
-
-/// Says of which topic a sample is malformed.
-pub(super) fn malformed(topic: &str) -> impl Fn(Box<CdrError>) -> ImportError {
-    move |why| ImportError::Malformed { topic: topic.to_owned(), why }
 }
 
 /// A type as it is written on the bus: appendable or final.
