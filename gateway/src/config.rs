@@ -31,7 +31,7 @@ pub(crate) use acl::acl;
 pub(crate) use allow::Allow;
 #[cfg(feature = "dds")]
 pub(crate) use bridge::{BENCH_TYPE, bench_types, dds_types};
-pub(crate) use bridge::{Bridge, Check, Dds, Endpoint, Framing, Sockets};
+pub(crate) use bridge::{Bridge, Check, Dds, DdsVersion, Endpoint, Framing, Sockets};
 pub(crate) use bus::Bus;
 pub(crate) use entities::{Entities, Operators};
 pub(crate) use error::ConfigError;

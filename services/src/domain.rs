@@ -4,32 +4,32 @@
 //! gets what the other side has. **Routes** are its own readers and writers in the domain, opened by what discovery finds: a reader
 //! for a topic that somebody writes, a writer for one that somebody reads.
 
+mod agreement;
 mod config;
-mod forms;
 mod incoming;
 mod outgoing;
 mod presence;
-mod quality;
 mod report;
 mod routes;
 #[cfg(test)]
 mod tests;
+mod topics;
 
-pub use config::{DomainConfig, Pattern, QualityRule};
+pub use config::DomainConfig;
 pub use presence::mark;
-pub use quality::text as quality_in_words;
 pub use report::{DomainStatus, RouteStatus};
 
 use crate::counters::counters;
-use crate::service::domain::{Arrival, DomainEvent, DomainGuid, Endpoint, RouteId};
+use crate::map::dds::Lost;
+use crate::service::domain::{Arrival, DomainCommand, DomainEvent, DomainGuid, Endpoint, RouteId};
 use crate::service::{Input, Level, Outbox, Service};
-use aldis_envelope::{Now, Prefix, Refusal, aldis};
-use forms::Forms;
+use aldis_envelope::{Monotonic, Now, Prefix, Refusal, aldis};
 use incoming::Registered;
 use outgoing::Written;
 use presence::Presence;
-use routes::{Routes, Way};
-use std::collections::BTreeMap;
+use routes::Routes;
+use std::collections::{BTreeMap, BTreeSet};
+use topics::Topics;
 
 /// How many changes wait for what discovery says of their writer, for each writer: news of it is on its way already.
 const EARLY_MAX: usize = 1_024;
@@ -55,6 +55,8 @@ counters! {
     shed_unannounced,
     /// Changes that another gateway had written.
     echoes_stopped,
+    /// Kinds of what the other version of UMAA cannot say.
+    untranslatable,
     /// Instances that were left by the last who wrote them.
     instances_left,
     /// Endpoints that did not come together with a route.
@@ -65,7 +67,7 @@ counters! {
 /// The bridge of one domain and partition.
 pub struct Domain {
     config: DomainConfig,
-    forms: Forms,
+    topics: Topics,
     endpoints: BTreeMap<DomainGuid, Endpoint>,
     presence: Presence,
     routes: Routes,
@@ -75,8 +77,13 @@ pub struct Domain {
     written: BTreeMap<RouteId, Written>,
     /// Changes of writers that discovery has not told of yet.
     early: BTreeMap<DomainGuid, Vec<(RouteId, Arrival)>>,
+    /// Writers that have just been opened beside others of their address: what is retained comes again, for them.
+    fresh: BTreeSet<RouteId>,
+    /// By route: a policy that keeps some endpoint away, of which discovery may still tell, and until when.
+    unexplained: BTreeMap<RouteId, (Monotonic, String)>,
     counters: DomainCounters,
-    subscribed: Vec<Prefix>,
+    /// The addresses of which messages are received.
+    subscribed: BTreeSet<String>,
     congested: bool,
 }
 
@@ -84,7 +91,7 @@ impl Domain {
     /// The bridge, before anything is known of its domain.
     pub fn new(config: DomainConfig) -> Self {
         Self {
-            forms: Forms::new(config.types.clone(), config.exact.clone()),
+            topics: Topics::new(&config),
             presence: Presence::new(&config),
             config,
             endpoints: BTreeMap::new(),
@@ -92,13 +99,15 @@ impl Domain {
             registered: BTreeMap::new(),
             written: BTreeMap::new(),
             early: BTreeMap::new(),
+            fresh: BTreeSet::new(),
+            unexplained: BTreeMap::new(),
             counters: DomainCounters::default(),
-            subscribed: Vec::new(),
+            subscribed: BTreeSet::new(),
             congested: false,
         }
     }
 
-    fn domain(&mut self, event: DomainEvent, out: &mut Outbox) {
+    fn domain(&mut self, now: Now, event: DomainEvent, out: &mut Outbox) {
         match event {
             DomainEvent::Joined => {}
             DomainEvent::Endpoint(endpoint) => self.endpoint(*endpoint, out),
@@ -128,7 +137,7 @@ impl Domain {
                 self.early.remove(&writer);
                 self.writer_gone(route, writer, autodispose, out);
             }
-            DomainEvent::Mismatch(route, policy) => self.mismatch(route, &policy, out),
+            DomainEvent::Mismatch(route, policy) => self.mismatch(now, route, policy, out),
             DomainEvent::Refused(route, why) => {
                 self.counters.refused_write += 1;
                 if let Some(text) = self.routes.first_trouble(route, &why) {
@@ -167,42 +176,39 @@ impl Domain {
     /// Opens and closes routes for those that are there.
     fn route_anew(&mut self, out: &mut Outbox) {
         let wanted = self.wanted();
-        let (opened, closed) = self.routes.change(wanted);
+        let (opened, closed) = self.routes.change(wanted, &mut self.topics);
         for route in closed {
             self.close(route, out);
         }
+        self.topics.keep(&self.routes.topics());
+        let mut again = BTreeSet::new();
         for opening in opened {
-            out.domain(crate::service::domain::DomainCommand::Open(Box::new(opening)));
+            if let Some(route) = self.routes.get(opening.route).filter(|_| opening.writes) {
+                if self.subscribed.contains(&route.address) {
+                    self.fresh.insert(opening.route);
+                    again.insert(route.address.clone());
+                }
+                if route.translated {
+                    self.topics.say_all_again();
+                }
+            }
+            out.domain(DomainCommand::Open(Box::new(opening)));
         }
-        let mut prefixes: Vec<Prefix> = self
-            .routes
-            .all()
-            .filter(|route| route.way == Way::Out)
-            .filter_map(|route| Prefix::new(&forms::address_of(&route.topic)).ok())
-            .collect();
-        prefixes.sort();
-        prefixes.dedup();
-        if prefixes != self.subscribed {
-            self.subscribed.clone_from(&prefixes);
-            out.subscribe(prefixes);
+        let addresses: BTreeSet<String> = self.routes.addresses().map(str::to_owned).collect();
+        if addresses != self.subscribed {
+            out.subscribe(addresses.iter().filter_map(|address| Prefix::new(address).ok()).collect());
+            self.subscribed = addresses;
+        }
+        if !again.is_empty() {
+            out.tell_again(again.iter().filter_map(|address| Prefix::new(address).ok()).collect());
         }
     }
 
-    fn mismatch(&mut self, route: RouteId, policy: &str, out: &mut Outbox) {
-        self.counters.mismatches += 1;
-        let Some(found) = self.routes.get(route) else { return };
-        let other =
-            |endpoint: &&Endpoint| endpoint.topic == found.topic && endpoint.writes == (found.way == Way::In);
-        let theirs = self.endpoints.values().filter(other).map(|endpoint| quality::text(&endpoint.quality));
-        let theirs = theirs.collect::<Vec<_>>().join("; ");
-        let text = format!(
-            "{}: {policy} does not agree: the bridge {} {}, the other side {theirs}",
-            found.topic,
-            if found.way == Way::In { "requests" } else { "offers" },
-            quality::text(&found.quality),
-        );
-        if let Some(text) = self.routes.first_trouble(route, &text) {
-            out.note(Level::Warning, text);
+    /// Says what the other version of UMAA cannot, which comes once for each kind.
+    fn lost(&mut self, lost: &[Lost], out: &mut Outbox) {
+        for lost in lost {
+            self.counters.untranslatable += 1;
+            out.note(Level::Warning, lost.to_string());
         }
     }
 }
@@ -212,9 +218,19 @@ impl Service for Domain {
         true
     }
 
-    fn handle(&mut self, _: Now, input: Input<'_>, out: &mut Outbox) {
+    fn next_deadline(&self) -> Option<Monotonic> {
+        self.unexplained.values().map(|(until, _)| *until).min()
+    }
+
+    fn handle(&mut self, now: Now, input: Input<'_>, out: &mut Outbox) {
+        if let Input::Again(envelope) = input {
+            self.leaves(envelope, true, out);
+            return;
+        }
+        self.fresh.clear();
         match input {
-            Input::Domain(event) => self.domain(event, out),
+            Input::Domain(event) => self.domain(now, event, out),
+            Input::Deadline => self.explain(now, out),
             Input::Message(envelope) if envelope.message.call.is_some() => {
                 if envelope.message.label.descriptor() == aldis::DOMAIN_QUERY {
                     self.report(envelope, out);
@@ -223,7 +239,7 @@ impl Service for Domain {
                     out.refuse(envelope, Refusal::NotUnderstood(what));
                 }
             }
-            Input::Message(envelope) => self.leaves(envelope, out),
+            Input::Message(envelope) => self.leaves(envelope, false, out),
             Input::Token(source, false) => self.source_gone(source, out),
             _ => {}
         }

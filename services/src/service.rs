@@ -48,6 +48,8 @@ pub enum Input<'a> {
     /// retains over a crash of the service; over the end of the process it keeps what is persistent, in the journal. What had
     /// ended does not come.
     Recovered(&'a Envelope),
+    /// A sample that it has got before and that is retained, as [`Outbox::tell_again`] asked.
+    Again(&'a Envelope),
     /// What others retain for its subscriptions has come, as far as it is to be had: true where every node that is known
     /// has told all of it, false where one has not in time or no other node is known. Comes once after each start; what comes later is news.
     HistoryComplete(bool),

@@ -28,7 +28,7 @@ pub use discovery::{Change, Discovery, Endpoint, Guid, Side, TypeInformation};
 pub use error::DdsError;
 pub use listener::Mismatch;
 pub use participant::{Participant, ParticipantConfig};
-pub use qos::{Access, Durability, History, Limits, Policy, Presentation, Qos, Representation};
+pub use qos::{Access, Durability, History, Limits, Liveliness, Policy, Presentation, Qos, Representation};
 pub use reader::Reader;
 pub use topic::{Topic, TypeSource};
 pub use writer::{Sending, Writer};

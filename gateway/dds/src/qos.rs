@@ -73,6 +73,16 @@ pub struct Presentation {
     pub ordered: bool,
 }
 
+/// LIVELINESS: who says that a writer lives. The numbers are those of Cyclone DDS.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[allow(missing_docs, reason = "DDS 1.4, 2.2.3.11")]
+#[repr(u32)]
+pub enum Liveliness {
+    Automatic = dds_liveliness_kind_DDS_LIVELINESS_AUTOMATIC,
+    ManualByParticipant = dds_liveliness_kind_DDS_LIVELINESS_MANUAL_BY_PARTICIPANT,
+    ManualByTopic = dds_liveliness_kind_DDS_LIVELINESS_MANUAL_BY_TOPIC,
+}
+
 /// How samples are written in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[allow(missing_docs, reason = "DDS-XTypes 1.3, 7.6.3.1")]
@@ -100,6 +110,8 @@ pub struct Qos {
     pub deadline: Option<Duration>,
     /// LATENCY_BUDGET.
     pub latency_budget: Duration,
+    /// LIVELINESS: who says that a writer lives, and how often at least; none is never.
+    pub liveliness: (Liveliness, Option<Duration>),
     /// PARTITION.
     pub partitions: Vec<String>,
     /// PRESENTATION.
@@ -128,6 +140,7 @@ impl Default for Qos {
             exclusive: None,
             deadline: None,
             latency_budget: Duration::ZERO,
+            liveliness: (Liveliness::Automatic, None),
             partitions: Vec::new(),
             presentation: Presentation::default(),
             by_source_timestamp: false,
@@ -219,6 +232,8 @@ impl Qos {
                 dds_qset_deadline(qos, nanoseconds(deadline));
             }
             dds_qset_latency_budget(qos, nanoseconds(self.latency_budget));
+            let (kind, lease) = self.liveliness;
+            dds_qset_liveliness(qos, kind as u32, lease.map_or(i64::MAX, nanoseconds));
             if !partitions.is_empty() {
                 dds_qset_partition(qos, partitions.len() as u32, partitions.as_mut_ptr());
             }

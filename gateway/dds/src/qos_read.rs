@@ -1,6 +1,6 @@
 //! Quality of service as discovery tells it.
 
-use crate::qos::{Access, Durability, History, Limits, Presentation, Qos, Representation};
+use crate::qos::{Access, Durability, History, Limits, Liveliness, Presentation, Qos, Representation};
 use cyclors::*;
 use std::ffi::{CStr, c_char};
 use std::time::Duration;
@@ -82,6 +82,16 @@ impl Qos {
             }
             if dds_qget_latency_budget(qos, &mut time) {
                 read.latency_budget = duration(time).unwrap_or(Duration::MAX);
+            }
+            if dds_qget_liveliness(qos, &mut kind, &mut time) {
+                let by = match kind {
+                    dds_liveliness_kind_DDS_LIVELINESS_AUTOMATIC => Liveliness::Automatic,
+                    dds_liveliness_kind_DDS_LIVELINESS_MANUAL_BY_PARTICIPANT => {
+                        Liveliness::ManualByParticipant
+                    }
+                    _ => Liveliness::ManualByTopic,
+                };
+                read.liveliness = (by, duration(time));
             }
             if dds_qget_presentation(qos, &mut kind, &mut flag, &mut second) {
                 let access = match kind {

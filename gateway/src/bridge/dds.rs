@@ -31,9 +31,14 @@ pub(crate) struct Endpoint {
     pub(crate) stall_timeout: Duration,
 }
 
+/// Quality of service as services see it.
+pub(crate) fn quality(qos: &aldis_dds::Qos) -> aldis_services::service::domain::Quality {
+    convert::quality(qos)
+}
+
 /// Quality of service in words.
 pub(crate) fn words(qos: &aldis_dds::Qos) -> String {
-    aldis_services::domain::quality_in_words(&convert::quality(qos))
+    aldis_services::map::dds::in_words(&quality(qos))
 }
 
 /// Takes part in a domain until the node ends. Blocks its thread: Cyclone DDS waits in places.

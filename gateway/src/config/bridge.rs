@@ -7,10 +7,10 @@ mod uxas_tcp;
 mod uxas_zmq;
 
 pub(crate) use common::Common;
-pub(crate) use dds::Dds;
 pub(super) use dds::DdsTable;
 #[cfg(feature = "dds")]
 pub(crate) use dds::{BENCH_TYPE, bench_types, dds_types};
+pub(crate) use dds::{Dds, DdsVersion};
 pub(super) use uxas_serial::UxasSerialTable;
 pub(crate) use uxas_serial::{Check, UxasSerial};
 pub(super) use uxas_tcp::UxasTcpTable;

@@ -1,51 +1,37 @@
 //! From the domain to the fleet.
 
-use super::forms::address_of;
-use super::routes::{Route, Way};
+use super::routes::Way;
 use super::{Domain, EARLY_MAX, EARLY_WRITERS_MAX};
+use crate::map::dds::{Body, ImportError, Taken};
+use crate::service::Outbox;
 use crate::service::domain::{Arrival, DomainGuid, RouteId};
-use crate::service::{Level, Outbox};
-use aldis_envelope::{Change, ContentType, Group, Instance, KeyHash, Label, Message, Name, Source, Wall};
-use bytes::Bytes;
+use aldis_envelope::{Change, Instance, KeyHash, Message, Wall};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// Who has which instance of a route registered, and how what ends of them is written.
+/// Who has which instance of a route registered.
 #[derive(Debug, Default)]
 pub(super) struct Registered {
     instances: BTreeMap<KeyHash, Held>,
-    /// Labels that were used, so that a stream has one.
-    labels: BTreeMap<ContentType, Arc<Label>>,
     last_time: Wall,
 }
 
 #[derive(Debug)]
 struct Held {
-    instance: Instance,
-    content_type: ContentType,
+    instance: Arc<Instance>,
     /// The writers, and whether each wants it disposed of when it leaves.
     writers: BTreeMap<DomainGuid, bool>,
     disposed: bool,
 }
 
-impl Registered {
-    fn label(
-        &mut self,
-        content_type: ContentType,
-        route: &Route,
-        own: Source,
-        partition: &str,
-    ) -> Option<Arc<Label>> {
-        if let Some(label) = self.labels.get(&content_type) {
-            return Some(label.clone());
-        }
-        let name = Name::new(&address_of(&route.topic)).ok()?;
-        let mut label = Label::broadcast(content_type.clone(), name, own);
-        label.attributes.source_group = Group::new(partition).ok()?;
-        let label = Arc::new(label);
-        self.labels.insert(content_type, label.clone());
-        Some(label)
-    }
+/// A change as it is taken.
+fn taken(arrival: &Arrival) -> Taken {
+    let (change, body) = match (arrival.is_sample, arrival.disposes) {
+        (true, _) => (Change::Put, Body::Sample(arrival.cdr.clone())),
+        (false, true) => (Change::Dispose, Body::Key(arrival.cdr.clone())),
+        (false, false) => (Change::Unregister, Body::Key(arrival.cdr.clone())),
+    };
+    Taken { writer: arrival.writer.0, source_time: arrival.source_time, change, body }
 }
 
 impl Domain {
@@ -66,40 +52,39 @@ impl Domain {
             return;
         }
         let Some(route) = self.routes.get(id).filter(|route| route.way == Way::In) else { return };
-        let (type_name, extensibility) = (route.type_name.clone(), route.extensibility);
-        let Some(form) = self.forms.form(&type_name, extensibility) else { return };
-        let read = match form.read(&arrival) {
-            Ok(read) => read,
+        let Some(topic) = self.topics.get_mut(route.map) else { return };
+        match topic.import(&taken(&arrival)) {
+            Ok(imported) => self.imported(id, &arrival, imported.message, out),
             Err(why) => {
-                self.counters.refused_malformed += 1;
-                let text = format!("a sample of {} is refused: {why}", route.topic);
-                if let Some(text) = self.routes.first_trouble(id, &text) {
-                    out.note(Level::Warning, text);
+                match why {
+                    ImportError::UnknownKey { .. } => self.counters.refused_unknown_key += 1,
+                    _ => self.counters.refused_malformed += 1,
                 }
-                return;
+                self.trouble(id, &why.to_string(), out);
             }
-        };
-        self.imported(id, &arrival, read, out);
+        }
     }
 
-    fn imported(&mut self, id: RouteId, arrival: &Arrival, read: super::forms::Incoming, out: &mut Outbox) {
-        let super::forms::Incoming { content_type, content, instance } = read;
+    fn imported(&mut self, id: RouteId, arrival: &Arrival, message: Message, out: &mut Outbox) {
         let registered = self.registered.entry(id).or_default();
         registered.last_time = registered.last_time.max(arrival.source_time);
-        let mut leaves = None;
-        if let Some(instance) = &instance {
-            leaves = registered.note(instance, &content_type, arrival);
-        }
         let at = arrival.source_time;
+        let Some(instance) = message.instance.clone() else {
+            if arrival.is_sample {
+                self.say(id, message, at, out);
+            }
+            return;
+        };
+        let leaves = registered.note(&instance, arrival);
         if arrival.is_sample {
-            self.say(id, content_type.clone(), Change::Put, instance.clone(), content, at, out);
+            self.say(id, message, at, out);
         }
         if arrival.disposes {
-            self.say(id, content_type.clone(), Change::Dispose, instance.clone(), Bytes::new(), at, out);
+            self.ends(id, Change::Dispose, instance.clone(), at, out);
         }
         if let Some(change) = leaves {
             self.counters.instances_left += 1;
-            self.say(id, content_type, change, instance, Bytes::new(), at, out);
+            self.ends(id, change, instance, at, out);
         }
     }
 
@@ -117,13 +102,13 @@ impl Domain {
         for held in registered.instances.values_mut() {
             let Some(wants) = held.writers.remove(&writer) else { continue };
             if let Some(change) = held.left(wants || autodispose) {
-                left.push((held.content_type.clone(), change, held.instance.clone()));
+                left.push((change, held.instance.clone()));
             }
         }
         registered.instances.retain(|_, held| !held.writers.is_empty());
-        for (content_type, change, instance) in left {
+        for (change, instance) in left {
             self.counters.instances_left += 1;
-            self.say(id, content_type, change, Some(instance), Bytes::new(), at, out);
+            self.ends(id, change, instance, at, out);
         }
     }
 
@@ -138,44 +123,50 @@ impl Domain {
         }
     }
 
-    #[allow(clippy::too_many_arguments, reason = "a change has so many sides")]
-    fn say(
-        &mut self,
-        id: RouteId,
-        content_type: ContentType,
-        change: Change,
-        instance: Option<Instance>,
-        content: Bytes,
-        at: Wall,
-        out: &mut Outbox,
-    ) {
+    fn ends(&mut self, id: RouteId, change: Change, instance: Arc<Instance>, at: Wall, out: &mut Outbox) {
+        let map = self.routes.get(id).and_then(|route| self.topics.get(route.map));
+        if let Some(message) = map.map(|map| map.end(change, instance)) {
+            self.say(id, message, at, out);
+        }
+    }
+
+    /// Tells the fleet, in its own version of UMAA.
+    fn say(&mut self, id: RouteId, message: Message, at: Wall, out: &mut Outbox) {
         let Some(route) = self.routes.get_mut(id) else { return };
-        if change != Change::Put && instance.is_none() {
+        route.crossed += 1;
+        if !route.translated {
+            self.send(message, at, out);
             return;
         }
-        let registered = self.registered.entry(id).or_default();
-        let Some(label) = registered.label(content_type, route, out.source(), &self.config.partition) else {
-            return;
-        };
-        route.crossed += 1;
-        self.counters.imported += 1;
-        let instance = instance.map(|mut instance| {
-            if change == Change::Put {
-                // The content carries it.
-                instance.key = None;
+        match self.topics.for_fleet(&route.topic, &message) {
+            Ok((messages, lost)) => {
+                self.lost(&lost, out);
+                for message in messages {
+                    self.send(message, at, out);
+                }
             }
-            Arc::new(instance)
-        });
-        out.send_at(Message { label, change, instance, call: None, content }, at);
+            Err(why) => {
+                self.counters.refused_malformed += 1;
+                self.trouble(id, &why, out);
+            }
+        }
+    }
+
+    fn send(&mut self, mut message: Message, at: Wall, out: &mut Outbox) {
+        self.counters.imported += 1;
+        if let Some(instance) = message.instance.as_mut().filter(|_| message.change == Change::Put) {
+            // The content carries it.
+            Arc::make_mut(instance).key = None;
+        }
+        out.send_at(message, at);
     }
 }
 
 impl Registered {
     /// Notes what a change does to who has an instance; what else is to be said of it when its last writer leaves.
-    fn note(&mut self, instance: &Instance, content_type: &ContentType, arrival: &Arrival) -> Option<Change> {
+    fn note(&mut self, instance: &Arc<Instance>, arrival: &Arrival) -> Option<Change> {
         let held = self.instances.entry(instance.hash).or_insert_with(|| Held {
             instance: instance.clone(),
-            content_type: content_type.clone(),
             writers: BTreeMap::new(),
             disposed: false,
         });

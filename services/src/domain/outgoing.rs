@@ -1,10 +1,11 @@
 //! From the fleet to the domain.
 
 use super::Domain;
-use super::forms::topic_of;
+use super::topics::representation;
+use crate::map::dds::Given;
 use crate::service::domain::{DomainCommand, RouteId, Sending};
 use crate::service::{Level, Outbox};
-use aldis_envelope::{Change, Envelope, KeyHash, Source, Wall};
+use aldis_envelope::{Address, Change, Envelope, Instance, KeyHash, Source, Wall};
 use bytes::Bytes;
 use std::collections::BTreeMap;
 
@@ -23,70 +24,120 @@ struct Live {
 }
 
 impl Domain {
-    /// A message of the fleet, for those who read its topic in the domain.
-    pub(super) fn leaves(&mut self, envelope: &Envelope, out: &mut Outbox) {
+    /// A message of the fleet, for those who read its topic in the domain. `again` where it is for those alone who have come since
+    /// it was written.
+    pub(super) fn leaves(&mut self, envelope: &Envelope, again: bool, out: &mut Outbox) {
         let label = &envelope.message.label;
-        let address = label.address.to_string();
-        let Some(topic) = topic_of(&address) else { return };
+        let Address::Name(address) = &label.address else { return };
         if label.attributes.source_group.as_str() != self.config.partition {
             return;
         }
-        for id in self.routes.writing(topic) {
-            if let Err(why) = self.write(id, envelope, out) {
-                self.counters.refused_malformed += 1;
-                let text = format!("a message of {} for {topic} is refused: {why}", label.source());
-                if let Some(text) = self.routes.first_trouble(id, &text) {
-                    out.note(Level::Warning, text);
-                }
+        let routes = self.routes.writing(address.as_str());
+        let wanted = |id: &&RouteId| !again || self.fresh.contains(id);
+        let routes: Vec<RouteId> = routes.iter().filter(wanted).copied().collect();
+        let Some(&first) = routes.first() else { return };
+        if self.routes.get(first).is_some_and(|route| route.translated) {
+            let written = self.write_translated(&routes, envelope, out);
+            self.refuses(written, envelope, out);
+        } else {
+            for id in routes {
+                let written = self.write(id, envelope, out).map_err(|why| (id, why));
+                self.refuses(written, envelope, out);
             }
+        }
+    }
+
+    fn refuses(&mut self, written: Result<(), (RouteId, String)>, envelope: &Envelope, out: &mut Outbox) {
+        if let Err((id, why)) = written {
+            self.counters.refused_malformed += 1;
+            let source = envelope.message.label.source();
+            self.trouble(id, &format!("a message of {source} is refused: {why}"), out);
         }
     }
 
     fn write(&mut self, id: RouteId, envelope: &Envelope, out: &mut Outbox) -> Result<(), String> {
         let Some(route) = self.routes.get(id) else { return Ok(()) };
-        let (type_name, extensibility, xcdr) = (route.type_name.clone(), route.extensibility, route.xcdr);
-        let Some(form) = self.forms.form(&type_name, extensibility) else { return Ok(()) };
+        let form = representation(route.xcdr, route.extensibility);
+        let Some(topic) = self.topics.get_mut(route.map) else { return Ok(()) };
         let message = &envelope.message;
         let written = self.written.entry(id).or_default();
-        let at = envelope.stamp.source_time;
-        written.last_time = written.last_time.max(at);
-        let known = message.instance.as_ref().and_then(|instance| written.instances.get(&instance.hash));
-        let (sending, cdr) = match (message.change, known) {
-            (Change::Dispose, Some(live)) => (Sending::Dispose, live.key.clone()),
-            (Change::Unregister, Some(live)) if live.source == message.label.source() => {
-                (Sending::Unregister, live.key.clone())
-            }
-            // Somebody else writes it now, or nobody here knows it.
-            (Change::Unregister, _) => return Ok(()),
-            _ => match form.write(message, xcdr).map_err(|why| why.to_string())? {
-                Some(written) => written,
-                None => {
-                    self.counters.refused_unknown_key += 1;
-                    return Ok(());
-                }
-            },
+        let instance = message.instance.as_deref();
+        let Given { change, bytes } = match written.known(instance, message.change, message.label.source()) {
+            Known::Nothing => topic.export(message, form).map_err(|why| why.to_string())?,
+            Known::Key(bytes) => Given { change: message.change, bytes },
+            Known::Others => return Ok(()),
         };
-        if let Some(instance) = &message.instance {
-            let source = message.label.source();
-            match (message.change, written.instances.get_mut(&instance.hash)) {
-                (Change::Unregister, _) => drop(written.instances.remove(&instance.hash)),
-                (_, Some(live)) => live.source = source,
-                (Change::Dispose, None) => {
-                    written.instances.insert(instance.hash, Live { key: cdr.clone(), source });
+        let is_new = |instance: &Instance| !written.instances.contains_key(&instance.hash);
+        let key = if change == Change::Put && instance.is_some_and(is_new) {
+            topic.key_sample(&bytes, form).map_err(|why| why.to_string())?
+        } else {
+            Some(bytes.clone())
+        };
+        self.give(id, (instance, key), Given { change, bytes }, envelope, out);
+        Ok(())
+    }
+
+    fn write_translated(
+        &mut self,
+        routes: &[RouteId],
+        envelope: &Envelope,
+        out: &mut Outbox,
+    ) -> Result<(), (RouteId, String)> {
+        let (samples, lost) = self.topics.for_bus(&envelope.message).map_err(|why| (routes[0], why))?;
+        self.lost(&lost, out);
+        for sample in &samples {
+            for &id in routes {
+                let Some(route) = self.routes.get(id).filter(|route| route.topic == sample.topic) else {
+                    continue;
+                };
+                let form = representation(route.xcdr, route.extensibility);
+                let Some(bus) = self.topics.newer() else { continue };
+                let given = bus.given(sample, form).and_then(|(instance, given)| {
+                    let topic = self.topics.get(route.map).filter(|_| given.change == Change::Put);
+                    let key = topic.map(|topic| topic.key_sample(&given.bytes, form)).transpose()?.flatten();
+                    Ok((instance, key.unwrap_or_else(|| given.bytes.clone()), given))
+                });
+                let (instance, key, given) = given.map_err(|why| (id, why.to_string()))?;
+                let written = self.written.entry(id).or_default();
+                let source = envelope.message.label.source();
+                if !matches!(written.known(instance.as_ref(), given.change, source), Known::Others) {
+                    self.give(id, (instance.as_ref(), Some(key)), given, envelope, out);
                 }
-                (Change::Put, None) => {
-                    if let Some(key) = form.key(message, xcdr).map_err(|why| why.to_string())? {
-                        written.instances.insert(instance.hash, Live { key, source });
-                    }
-                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes a change, and notes who has written its instance, of which the key is given where it is new.
+    fn give(
+        &mut self,
+        id: RouteId,
+        (instance, key): (Option<&Instance>, Option<Bytes>),
+        given: Given,
+        envelope: &Envelope,
+        out: &mut Outbox,
+    ) {
+        let (at, source) = (envelope.stamp.source_time, envelope.message.label.source());
+        let written = self.written.entry(id).or_default();
+        written.last_time = written.last_time.max(at);
+        if let Some(instance) = instance {
+            match (given.change, written.instances.get_mut(&instance.hash), key) {
+                (Change::Unregister, _, _) => drop(written.instances.remove(&instance.hash)),
+                (_, Some(live), _) => live.source = source,
+                (_, None, Some(key)) => drop(written.instances.insert(instance.hash, Live { key, source })),
+                (_, None, None) => {}
             }
         }
         self.counters.exported += 1;
         if let Some(route) = self.routes.get_mut(id) {
             route.crossed += 1;
         }
-        out.domain(DomainCommand::Write(id, sending, cdr, at));
-        Ok(())
+        let sending = match given.change {
+            Change::Put => Sending::Sample,
+            Change::Dispose => Sending::Dispose,
+            Change::Unregister => Sending::Unregister,
+        };
+        out.domain(DomainCommand::Write(id, sending, given.bytes, at));
     }
 
     /// A service of another node is gone: what it wrote has no writer any more. That is lost contact and no cancel.
@@ -100,6 +151,37 @@ impl Domain {
                 }
                 live.source != source
             });
+        }
+        self.topics.say_all_again();
+    }
+
+    /// Tells a trouble of a route once.
+    pub(super) fn trouble(&mut self, id: RouteId, text: &str, out: &mut Outbox) {
+        let topic = self.routes.get(id).map(|route| route.topic.clone()).unwrap_or_default();
+        if let Some(text) = self.routes.first_trouble(id, &format!("{topic}: {text}")) {
+            out.note(Level::Warning, text);
+        }
+    }
+}
+
+/// What is known of the end of an instance.
+enum Known {
+    /// Nothing: the message says all of it.
+    Nothing,
+    /// Its key as it is written.
+    Key(Bytes),
+    /// Somebody else writes it now, or nobody here knows it.
+    Others,
+}
+
+impl Written {
+    fn known(&self, instance: Option<&Instance>, change: Change, source: Source) -> Known {
+        let live = instance.and_then(|instance| self.instances.get(&instance.hash));
+        match (change, live) {
+            (Change::Put, _) | (Change::Dispose, None) => Known::Nothing,
+            (Change::Dispose, Some(live)) => Known::Key(live.key.clone()),
+            (Change::Unregister, Some(live)) if live.source == source => Known::Key(live.key.clone()),
+            (Change::Unregister, _) => Known::Others,
         }
     }
 }

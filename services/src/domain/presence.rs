@@ -24,7 +24,7 @@ pub(super) struct Presence {
 
 /// What a gateway says of itself in its USER_DATA.
 pub fn mark(config: &DomainConfig) -> String {
-    format!("{MARK};{};{};{}", config.fleet.as_str(), config.entity.get(), config.partition)
+    format!("{MARK};{};{};{}", config.fleet.as_str(), config.source.entity.get(), config.partition)
 }
 
 fn prefix(guid: DomainGuid) -> [u8; 12] {
@@ -35,7 +35,7 @@ fn prefix(guid: DomainGuid) -> [u8; 12] {
 
 impl Presence {
     pub(super) fn new(config: &DomainConfig) -> Self {
-        let (fleet, entity) = (config.fleet.as_str().to_owned(), config.entity.get());
+        let (fleet, entity) = (config.fleet.as_str().to_owned(), config.source.entity.get());
         Self { own: Gateway { fleet, entity, partition: config.partition.clone() }, others: BTreeMap::new() }
     }
 

@@ -1,7 +1,8 @@
 //! What a bridge to a domain says of itself.
 
+use super::Domain;
 use super::routes::Way;
-use super::{Domain, quality};
+use crate::map::dds::in_words;
 use crate::service::Outbox;
 use aldis_envelope::{ContentType, Envelope, Name, aldis};
 use serde::{Deserialize, Serialize};
@@ -53,14 +54,14 @@ impl Domain {
         let routes = self.routes.all().map(|route| {
             let inward = route.way == Way::In;
             let other = |endpoint: &&crate::service::domain::Endpoint| {
-                endpoint.topic == route.topic && endpoint.writes == inward && self.is_bridged(endpoint)
+                route.faces(endpoint) && self.is_bridged(endpoint)
             };
             RouteStatus {
                 topic: route.topic.clone(),
                 type_name: route.type_name.clone(),
                 inward,
-                own: quality::text(&route.quality),
-                others: self.endpoints.values().filter(other).map(|e| quality::text(&e.quality)).collect(),
+                own: in_words(&route.quality),
+                others: self.endpoints.values().filter(other).map(|e| in_words(&e.quality)).collect(),
                 state: match &route.state {
                     None => "opening".to_owned(),
                     Some(Ok(())) => "open".to_owned(),

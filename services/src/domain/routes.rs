@@ -1,11 +1,14 @@
 //! Routes: a bridge's own readers and writers, as what discovery finds calls for them.
 
-use super::forms::has_form;
-use super::{Domain, quality};
+use super::Domain;
+use super::topics::{TopicId, Topics, is_described};
+use crate::map::dds::{Glob, address_of, offered, requested};
 use crate::service::Outbox;
 use crate::service::domain::{DomainCommand, DomainGuid, Endpoint, Opening, Quality, RouteId, Xcdr};
+use aldis_envelope::Name;
 use aldis_envelope::description::Extensibility;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 /// How many routes a bridge has at the most: beyond it what comes is listed and not bridged.
 const ROUTES_MAX: usize = 4_096;
@@ -34,6 +37,13 @@ pub(super) struct RouteKey {
 #[derive(Debug, Clone)]
 pub(super) struct Route {
     pub(super) topic: String,
+    pub(super) map: TopicId,
+    /// Where its messages are in the fleet.
+    pub(super) address: String,
+    /// Whether they are of another version of UMAA there.
+    pub(super) translated: bool,
+    /// What calls for it.
+    key: RouteKey,
     pub(super) way: Way,
     pub(super) extensibility: Extensibility,
     pub(super) xcdr: Xcdr,
@@ -51,6 +61,8 @@ pub(super) struct Route {
 pub(super) struct Routes {
     routes: BTreeMap<RouteId, Route>,
     by_key: BTreeMap<RouteKey, RouteId>,
+    /// The routes that write, by the address of their messages.
+    writing: BTreeMap<String, Arc<[RouteId]>>,
     next: u32,
 }
 
@@ -76,11 +88,27 @@ impl Routes {
         self.routes.values()
     }
 
-    /// The routes that write a topic into the domain.
-    pub(super) fn writing(&self, topic: &str) -> Vec<RouteId> {
-        let of_topic =
-            |(id, route): (&RouteId, &Route)| (route.way == Way::Out && route.topic == topic).then_some(*id);
-        self.routes.iter().filter_map(of_topic).collect()
+    /// The routes that write messages of an address into the domain.
+    pub(super) fn writing(&self, address: &str) -> Arc<[RouteId]> {
+        self.writing.get(address).cloned().unwrap_or_default()
+    }
+
+    /// The addresses of which messages are written into the domain.
+    pub(super) fn addresses(&self) -> impl Iterator<Item = &str> {
+        self.writing.keys().map(String::as_str)
+    }
+
+    /// The topics that are in use.
+    pub(super) fn topics(&self) -> BTreeSet<TopicId> {
+        self.routes.values().map(|route| route.map).collect()
+    }
+
+    fn list_writing(&mut self) {
+        let mut writing: BTreeMap<String, Vec<RouteId>> = BTreeMap::new();
+        for (id, route) in self.routes.iter().filter(|(_, route)| route.way == Way::Out) {
+            writing.entry(route.address.clone()).or_default().push(*id);
+        }
+        self.writing = writing.into_iter().map(|(address, ids)| (address, ids.into())).collect();
     }
 
     pub(super) fn opened(&mut self, id: RouteId, result: Result<(), String>) -> Option<String> {
@@ -102,7 +130,11 @@ impl Routes {
 
     /// Has the routes that are called for; what is to be opened, and what is closed. A route whose quality of service must differ from
     /// what it has is opened anew.
-    pub(super) fn change(&mut self, wanted: Vec<Wanted>) -> (Vec<Opening>, Vec<RouteId>) {
+    pub(super) fn change(
+        &mut self,
+        wanted: Vec<Wanted>,
+        topics: &mut Topics,
+    ) -> (Vec<Opening>, Vec<RouteId>) {
         let keeps = |key: &RouteKey, id: &RouteId, routes: &BTreeMap<RouteId, Route>| {
             wanted.iter().any(|wanted| {
                 wanted.key == *key && routes.get(id).is_some_and(|route| route.quality == wanted.quality)
@@ -116,10 +148,17 @@ impl Routes {
             if self.by_key.contains_key(&wanted.key) || self.by_key.len() >= ROUTES_MAX {
                 continue;
             }
+            let key = wanted.key;
+            let Some(map) = topics.id(&key.topic, &wanted.type_name) else { continue };
+            let (address, translated) = topics.address(&key.topic, &wanted.type_name);
             self.next += 1;
-            let (id, key) = (RouteId(self.next), wanted.key);
+            let id = RouteId(self.next);
             let route = Route {
                 topic: key.topic.clone(),
+                map,
+                address,
+                translated,
+                key: key.clone(),
                 way: key.way,
                 extensibility: key.extensibility,
                 xcdr: key.xcdr.unwrap_or(Xcdr::V2),
@@ -141,11 +180,25 @@ impl Routes {
             self.routes.insert(id, route);
             self.by_key.insert(key, id);
         }
+        self.list_writing();
         (opened, closed)
     }
 
     fn forget(&mut self, id: RouteId) {
         self.routes.remove(&id);
+        self.list_writing();
+    }
+}
+
+impl Route {
+    /// Whether an endpoint of its topic is one that called for it.
+    pub(super) fn serves(&self, endpoint: &Endpoint) -> bool {
+        key_of(endpoint) == self.key
+    }
+
+    /// Whether an endpoint is on the other side of its topic.
+    pub(super) fn faces(&self, endpoint: &Endpoint) -> bool {
+        endpoint.topic == self.topic && endpoint.writes == (self.way == Way::In)
     }
 }
 
@@ -161,9 +214,11 @@ impl Domain {
         }
         let want = |(key, endpoints): (RouteKey, Vec<&Endpoint>)| {
             let first = endpoints.iter().find(|endpoint| endpoint.extensibility.is_some());
+            let others: Vec<&Quality> = endpoints.iter().map(|endpoint| &endpoint.quality).collect();
+            let (topic, rules, partition) = (&key.topic, &self.config.rules, &self.config.partition);
             let quality = match (key.way, key.xcdr) {
-                (Way::In, _) | (_, None) => quality::request(&self.config, &key.topic, &endpoints),
-                (Way::Out, Some(xcdr)) => quality::offer(&self.config, &key.topic, &endpoints, xcdr),
+                (Way::In, _) | (_, None) => requested(topic, rules, partition, &others),
+                (Way::Out, Some(xcdr)) => offered(topic, rules, partition, &others, xcdr),
             };
             Wanted {
                 like: first.map(|endpoint| endpoint.guid),
@@ -182,15 +237,16 @@ impl Domain {
 
     /// Why an endpoint's topic does not cross.
     pub(super) fn why_not(&self, endpoint: &Endpoint) -> Option<&'static str> {
-        let matches = |patterns: &[super::Pattern]| patterns.iter().any(|p| p.matches(&endpoint.topic));
         if self.presence.is_gateway(endpoint.guid) {
             Some("it is a gateway's")
-        } else if !matches(&self.config.allow) || matches(&self.config.deny) {
+        } else if !self.config.topics.admit(&endpoint.topic) {
             Some("its topic is not allowed")
         } else if !self.is_in_partition(endpoint) {
             Some("it is in another partition")
-        } else if !has_form(&self.config.types, &endpoint.type_name) {
+        } else if !is_described(&self.config.types, &endpoint.type_name) {
             Some("its type is not described: give `idl`")
+        } else if Name::new(&address_of(&endpoint.topic)).is_err() {
+            Some("its topic's name is too long, or holds `$` or `|`")
         } else {
             None
         }
@@ -199,7 +255,7 @@ impl Domain {
     fn is_in_partition(&self, endpoint: &Endpoint) -> bool {
         let partitions = &endpoint.quality.partitions;
         let own = &self.config.partition;
-        let matches = |name: &String| super::Pattern(name.clone()).matches(own);
+        let matches = |name: &String| name == own || name.parse::<Glob>().is_ok_and(|glob| glob.matches(own));
         if partitions.is_empty() { own.is_empty() } else { partitions.iter().any(matches) }
     }
 

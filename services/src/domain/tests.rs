@@ -1,12 +1,17 @@
 //! The bridge as the node sees it: inputs in, messages and commands out.
 
 use super::*;
+use crate::map::dds::Rules;
 use crate::service::domain::{DomainCommand, Durable, Opening, Quality, Sending, Xcdr};
 use crate::service::{Action, Outbox, Service};
 use aldis_envelope::description::{Definition, Draft, Extensibility, Member, Structure, Type};
-use aldis_envelope::{BootId, Change, ContentType, Envelope, Fleet, Message, Priority, Source, Stamp, Wall};
+use aldis_envelope::{
+    BootId, Change, ContentType, Envelope, Fleet, Message, Monotonic, Now, Priority, Source, Stamp, Wall,
+};
 use bytes::Bytes;
 use std::sync::Arc;
+
+mod version;
 
 fn source(entity: u64, service: u32) -> Source {
     format!("eid{entity}sid{service}")
@@ -32,13 +37,13 @@ fn config() -> DomainConfig {
     draft.add("T::Plain", Definition::Structure(plain)).unwrap();
     DomainConfig {
         fleet: Fleet::new("test").unwrap(),
-        entity: source(5, 1).entity,
+        source: source(5, 30),
         partition: String::new(),
-        allow: vec![Pattern("*".into())],
-        deny: vec![Pattern("secret*".into())],
+        topics: Rules { allow: Vec::new(), deny: vec!["secret*".parse().unwrap()] },
         rules: Vec::new(),
         types: Arc::new(draft.finish().unwrap()),
         exact: Arc::default(),
+        translates: false,
         queue_max: 100,
     }
 }
@@ -53,7 +58,11 @@ fn quality() -> Quality {
         access: 0,
         ordered: false,
         by_source_time: false,
-        deadline_ms: None,
+        coherent: false,
+        deadline_ns: None,
+        latency_budget_ns: 0,
+        liveliness: 0,
+        lease_ns: None,
         partitions: Vec::new(),
         autodispose: true,
         xcdr: vec![Xcdr::V2],
@@ -92,7 +101,11 @@ struct Stage {
 
 impl Stage {
     fn new() -> Self {
-        Self { domain: Domain::new(config()), out: Outbox::new(source(5, 30)) }
+        Self::with(config())
+    }
+
+    fn with(config: DomainConfig) -> Self {
+        Self { domain: Domain::new(config), out: Outbox::new(source(5, 30)) }
     }
 
     fn give(&mut self, event: DomainEvent) -> Vec<Action> {
@@ -191,7 +204,7 @@ fn an_instance_is_left_when_its_last_writer_leaves() {
 fn what_another_gateway_writes_is_not_taken() {
     let mut stage = Stage::new();
     let route = stage.opens(endpoint(guid(1, 1), true, "Plain"))[0].route;
-    let other = DomainConfig { entity: source(9, 1).entity, ..config() };
+    let other = DomainConfig { source: source(9, 1), ..config() };
     let early = DomainEvent::Arrived(route, written(guid(4, 1), 1, sample(1, 1)));
     assert!(stage.says(early).is_empty(), "nobody has told of this writer yet");
     stage.give(DomainEvent::Participant(guid(4, 0), mark(&other).into_bytes()));
@@ -206,7 +219,7 @@ fn what_another_gateway_writes_is_not_taken() {
 fn of_two_gateways_in_one_partition_the_smaller_bridges() {
     let mut stage = Stage::new();
     stage.opens(endpoint(guid(1, 1), true, "Plain"));
-    let smaller = DomainConfig { entity: source(3, 1).entity, ..config() };
+    let smaller = DomainConfig { source: source(3, 1), ..config() };
     let closed = stage.give(DomainEvent::Participant(guid(4, 0), mark(&smaller).into_bytes()));
     assert!(closed.iter().any(|action| matches!(action, Action::Domain(DomainCommand::Close(_)))));
     assert_eq!(stage.domain.status().stands_by_for, Some(3));
@@ -228,4 +241,36 @@ fn ends_are_written_with_the_key_and_lost_contact_is_no_cancel() {
     stage.domain.handle(Default::default(), Input::Token(far, false), &mut stage.out);
     let left: Vec<_> = stage.written().into_iter().map(|(sending, _, _)| sending).collect();
     assert_eq!(left, [Sending::Unregister; 3]);
+}
+
+#[test]
+fn who_differs_in_what_it_requests_is_told_and_who_has_a_route_of_its_own_is_not() {
+    let mut stage = Stage::new();
+    let route = stage.opens(endpoint(guid(1, 1), false, "Plain"))[0].route;
+    let DomainEvent::Endpoint(mut other) = endpoint(guid(2, 1), false, "Plain") else { unreachable!() };
+    other.extensibility = Some(Extensibility::Appendable);
+    stage.give(DomainEvent::Endpoint(other.clone()));
+    let notes = |actions: Vec<Action>| {
+        let text = |action| if let Action::Note(note) = action { Some(note.text) } else { None };
+        actions.into_iter().filter_map(text).collect::<Vec<_>>()
+    };
+    let mismatch = |policy: &str| DomainEvent::Mismatch(route, policy.to_owned());
+    let later = |stage: &mut Stage, seconds| {
+        let now = Now {
+            monotonic: Monotonic::START + std::time::Duration::from_secs(seconds),
+            ..Default::default()
+        };
+        stage.domain.handle(now, Input::Deadline, &mut stage.out);
+        stage.out.drain().collect::<Vec<_>>()
+    };
+    assert_eq!(notes(stage.give(mismatch("TYPE_CONSISTENCY_ENFORCEMENT"))), [""; 0]);
+    assert_eq!(notes(later(&mut stage, 3)), [""; 0], "another route is there for it");
+    assert_eq!(notes(stage.give(mismatch("DURABILITY"))), [""; 0], "discovery has not told of it yet");
+    let DomainEvent::Endpoint(mut strict) = endpoint(guid(3, 1), false, "Plain") else { unreachable!() };
+    strict.quality.durable = Durable::Persistent;
+    stage.give(DomainEvent::Endpoint(strict));
+    let told = ["Plain: DURABILITY: TRANSIENT_LOCAL is offered, PERSISTENT requested"];
+    assert_eq!(notes(later(&mut stage, 6)), told);
+    assert_eq!(notes(stage.give(mismatch("DURABILITY"))), [""; 0], "it is told once");
+    assert_eq!((stage.domain.counters.mismatches, stage.domain.next_deadline()), (2, None));
 }

@@ -5,7 +5,9 @@ use crate::event::Effect;
 use crate::host::Ran;
 use crate::service::domain::DomainEvent;
 use crate::service::{Action, Component, ComponentHealth, Condition, Input, JobOutput, Level, Note};
-use aldis_envelope::{Address, CallId, Message, Now, Prefix, Priority, Refusal, ServiceId, Source, Wall};
+use aldis_envelope::{
+    Address, CallId, Envelope, Message, Now, Prefix, Priority, Refusal, ServiceId, Source, Wall,
+};
 use std::time::Duration;
 
 /// What a service says.
@@ -106,6 +108,7 @@ impl Node {
                     self.take_message(now, source, work, effects);
                 }
                 Action::Subscribe(prefixes) => self.subscribe_anew(now, place, prefixes, effects),
+                Action::TellAgain(prefixes) => self.tell_again(now, place, &prefixes, effects),
                 Action::Domain(command) => effects.push(Effect::Domain(source, command)),
                 Action::Congested(congested) => self.services[place].set_congested(congested),
                 Action::Call(message, within) => self.open_call(now, place, message, within, effects),
@@ -145,25 +148,39 @@ impl Node {
     fn subscribe_anew(&mut self, now: Now, place: usize, prefixes: Vec<Prefix>, effects: &mut Vec<Effect>) {
         let had: Vec<Prefix> = self.services[place].subscribed().cloned().collect();
         self.services[place].set_prefixes(prefixes);
-        let own = self.services[place].spec.source;
-        let is_new = |address: &Address| {
-            self.services[place].receives(address) && !had.iter().any(|prefix| prefix.matches(address))
+        let is_new = |node: &Self, address: &Address| {
+            node.services[place].receives(address) && !had.iter().any(|prefix| prefix.matches(address))
         };
-        let mut kept = Vec::new();
-        for (address, history) in self.sharing.writers.histories() {
-            if is_new(address) {
-                kept.extend(history.samples().filter(|s| s.message.label.source() != own).cloned());
-            }
-        }
-        for (address, history) in self.sharing.reading.histories() {
-            if is_new(&address) {
-                kept.extend(history.samples().cloned());
-            }
-        }
+        let kept = self.retained(place, is_new);
         self.subscribe(now, effects);
         for envelope in &kept {
             self.run(now, place, Input::Message(envelope), effects);
         }
+    }
+
+    /// Tells a service again what is retained here.
+    fn tell_again(&mut self, now: Now, place: usize, prefixes: &[Prefix], effects: &mut Vec<Effect>) {
+        let is_wanted = |_: &Self, address: &Address| prefixes.iter().any(|prefix| prefix.matches(address));
+        for envelope in &self.retained(place, is_wanted) {
+            self.run(now, place, Input::Again(envelope), effects);
+        }
+    }
+
+    /// What is retained here of what others than a service have said.
+    fn retained(&self, place: usize, is_wanted: impl Fn(&Self, &Address) -> bool) -> Vec<Envelope> {
+        let own = self.services[place].spec.source;
+        let mut kept = Vec::new();
+        for (address, history) in self.sharing.writers.histories() {
+            if is_wanted(self, address) {
+                kept.extend(history.samples().filter(|s| s.message.label.source() != own).cloned());
+            }
+        }
+        for (address, history) in self.sharing.reading.histories() {
+            if is_wanted(self, &address) {
+                kept.extend(history.samples().cloned());
+            }
+        }
+        kept
     }
 
     fn take_message(&mut self, now: Now, source: Source, work: Work, effects: &mut Vec<Effect>) {

@@ -48,10 +48,18 @@ pub struct Quality {
     pub access: u8,
     /// PRESENTATION: order is kept over the access scope.
     pub ordered: bool,
+    /// PRESENTATION: sets of changes are seen together.
+    pub coherent: bool,
     /// DESTINATION_ORDER is by source timestamp.
     pub by_source_time: bool,
-    /// DEADLINE in milliseconds.
-    pub deadline_ms: Option<u64>,
+    /// DEADLINE in nanoseconds.
+    pub deadline_ns: Option<u64>,
+    /// LATENCY_BUDGET in nanoseconds.
+    pub latency_budget_ns: u64,
+    /// LIVELINESS: 0 automatic, 1 by participant, 2 by topic.
+    pub liveliness: u8,
+    /// LIVELINESS: its lease in nanoseconds.
+    pub lease_ns: Option<u64>,
     /// PARTITION.
     pub partitions: Vec<String>,
     /// Whether instances that a writer leaves are disposed of.

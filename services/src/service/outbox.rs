@@ -20,6 +20,8 @@ pub enum Action {
     SendAt(Message, Wall),
     /// Receive these from now on, and no others.
     Subscribe(Vec<Prefix>),
+    /// Be told again what is retained of these.
+    TellAgain(Vec<Prefix>),
     /// Do something in the DDS domain that this service bridges.
     Domain(DomainCommand),
     /// Stop (true) or go on reading from peers and bus: what this service hands on is not taken.
@@ -68,6 +70,12 @@ impl Outbox {
     /// Receives these from now on, in place of what it received before. What is retained of what is new comes as messages.
     pub fn subscribe(&mut self, prefixes: Vec<Prefix>) {
         self.actions.push(Action::Subscribe(prefixes));
+    }
+
+    /// Wants to be told again what is retained of these, of which it has all: it comes as [`Input::Again`](super::Input::Again) before
+    /// anything else.
+    pub fn tell_again(&mut self, prefixes: Vec<Prefix>) {
+        self.actions.push(Action::TellAgain(prefixes));
     }
 
     /// Has something done in the DDS domain that this service bridges.

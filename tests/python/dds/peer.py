@@ -4,7 +4,7 @@
     ["write", TOPIC, {member: value}, TIME]     members left out are zero; TIME in nanoseconds, or null for now
     ["dispose" | "unregister", TOPIC, {key members}, TIME]
     ["reader", TOPIC, TYPE, {qos}]      tells each change as [TOPIC, state, {members}, source time]
-    ["matched", TOPIC, N]               waits until N endpoints match, then says so
+    ["matched", TOPIC, N]               waits until N endpoints match at least, then says so
     ["close", TOPIC]
 """
 
@@ -16,12 +16,13 @@ import typing
 
 from cyclonedds.core import Qos, Policy, InstanceState, WaitSet, ReadCondition, SampleState, ViewState
 from cyclonedds.domain import Domain, DomainParticipant
-from cyclonedds.idl import IdlStruct
+from cyclonedds.idl import IdlStruct, IdlUnion
 from cyclonedds.pub import DataWriter, Publisher
 from cyclonedds.sub import DataReader, Subscriber
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
+from plant_types import Plant
 from umaa_types import Types
 
 CONFIG = """<CycloneDDS><Domain><General><AllowMulticast>false</AllowMulticast><Interfaces>
@@ -62,12 +63,12 @@ def plain_kind(kind):
 
 def value_of(kind, given):
     kind = plain_kind(kind)
-    if dataclasses.is_dataclass(kind):
+    if dataclasses.is_dataclass(kind) or isinstance(kind, type) and issubclass(kind, IdlUnion):
         return build(kind, given)
     if hasattr(kind, "__members__"):
         return kind[given]
-    if isinstance(given, list) and given and isinstance(given[0], dict):
-        return [build(typing.get_args(kind)[1].subtype, each) for each in given]
+    if isinstance(given, list):
+        return [value_of(typing.get_args(kind)[1].subtype, each) for each in given]
     return bytes.fromhex(given) if isinstance(given, str) and "array[" in str(kind) else given
 
 
@@ -76,6 +77,8 @@ def hints(kind):
 
 
 def build(kind, given):
+    if issubclass(kind, IdlUnion):
+        return kind(**given)
     members = hints(kind)
     return kind(**{name: value_of(member, given[name]) if given.get(name) is not None else zero(member)
                    for name, member in members.items()})
@@ -86,6 +89,9 @@ def tell(value):
         return value
     if hasattr(value, "name"):
         return value.name
+    if isinstance(value, IdlUnion):
+        names = [name for name in hints(type(value)) if getattr(value, name, None) is not None]
+        return {name: tell(getattr(value, name)) for name in names}
     if isinstance(value, IdlStruct):
         return {name: tell(getattr(value, name)) for name in hints(type(value))}
     if isinstance(value, (bytes, bytearray)) or len(value) == 16 and all(isinstance(x, int) for x in value):
@@ -96,7 +102,7 @@ def tell(value):
 def qos(given, writes):
     policies = [
         Policy.Reliability.BestEffort if given.get("best_effort") else Policy.Reliability.Reliable(duration(seconds=10)),
-        Policy.Durability.Volatile if given.get("volatile") else Policy.Durability.TransientLocal,
+        getattr(Policy.Durability, given.get("durability", "TransientLocal")),
         Policy.History.KeepAll if given.get("keep_all") else Policy.History.KeepLast(given.get("keep_last", 1)),
         Policy.DestinationOrder.BySourceTimestamp,
     ]
@@ -122,7 +128,8 @@ class Peer:
     def kind(self, name):
         version, extensibility, topic = name.split(" ", 2)
         if (version, extensibility) not in self.known:
-            self.known[version, extensibility] = Types(version, extensibility)
+            kinds = Plant if version == "plant" else Types
+            self.known[version, extensibility] = kinds(version, extensibility)
         return self.known[version, extensibility].topics[topic]
 
     def writer(self, topic, name, given):
@@ -136,8 +143,8 @@ class Peer:
         wanted = qos(given, False)
         reader = DataReader(Subscriber(self.participant, wanted), Topic(self.participant, topic, kind), wanted)
         self.readers[topic] = reader
-        threading.Thread(target=self.follow, args=(topic, reader), daemon=True).start()
         say(["reader", topic])
+        threading.Thread(target=self.follow, args=(topic, reader), daemon=True).start()
 
     def follow(self, topic, reader):
         waits = WaitSet(self.participant)
@@ -167,7 +174,7 @@ class Peer:
                 return len(self.writers[topic].get_matched_subscriptions())
             return len(self.readers[topic].get_matched_publications())
         pause = threading.Event()
-        while now() != count:
+        while now() < count:
             pause.wait(0.01)
         say(["matched", topic, count])
 
@@ -188,10 +195,10 @@ class Peer:
 
 def keys(sample):
     """The key members, which alone mean something of a sample without data."""
-    wanted = {"source", "sessionID", "destination", "resourceID", "code"}
+    sample = getattr(sample, "key_sample", sample)
     annotated = getattr(type(sample), "__idl_field_annotations__", {})
-    names = [name for name, notes in annotated.items() if notes.get("key")] or list(wanted)
-    return {name: tell(getattr(sample, name)) for name in names if hasattr(sample, name)}
+    names = [name for name, notes in annotated.items() if notes.get("key")]
+    return {name: tell(getattr(sample, name)) for name in names}
 
 
 Peer(int(sys.argv[1])).run()

@@ -95,4 +95,43 @@ class Types:
         )
         report = [("controlInfo", types.sequence[control, 256]), ("timeStamp", time), ("source", ident)]
         topics.append(self.topic("ResourceAllocation", "ResourceAllocationReport", report, ("source",)))
-        return dict(topics)
+        return dict(topics + self.configuration() + self.priorities(session, status))
+
+    def configuration(self):
+        """The resources of a provider: inline in 5.2.1, a large set in 6.0."""
+        name = "ResourceAllocationConfigReport"
+        end = [("timeStamp", self.time), ("source", self.identifier)]
+        definition = self.struct(
+            "UMAA::SO::ResourceAllocation::ResourceAllocationDefinitionType",
+            [("relatedSources", types.sequence[self.identifier, 100]), ("resourceID", self.identifier)], ("resourceID",),
+        )
+        if not self.six:
+            resources = [("resources", types.sequence[definition, 256])]
+            return [self.topic("ResourceAllocation", name, resources + end, ("source",))]
+        metadata = self.struct(
+            "UMAA::Common::LargeSetMetadata",
+            [("setID", GUID), ("updateElementID", GUID), ("updateElementTimestamp", self.time), ("size", types.int32)],
+            (), ("updateElementTimestamp",),
+        )
+        element = [("element", definition), ("setID", GUID), ("elementID", GUID), ("elementTimestamp", self.time)]
+        topic = f"UMAA::SO::ResourceAllocation::{name}TypeResourcesSetElement"
+        report = self.topic("ResourceAllocation", name, end + [("resourcesSetMetadata", metadata)], ("source",))
+        return [report, (topic, self.struct(topic, element, ("setID", "elementID")))]
+
+    def priorities(self, session, status):
+        """Who may have a resource."""
+        name, ids = "ResourceAllocationPriorityCommand", ("source", "sessionID")
+        infos, count = (24, 64) if self.six else (32, 100)
+        command = [("priorities", types.sequence[self.identifier, 100]), ("resourceID", self.identifier),
+                   ("timeStamp", self.time)] + session + [("destination", self.identifier)]
+        command = self.topic("ResourceAllocation", name, command, ids + ("destination",))
+        status = self.topic("ResourceAllocation", name + "Status", status, ids)
+        ack = [("command", command[1]), ("timeStamp", self.time)] + session
+        ack = self.topic("ResourceAllocation", name + "AckReport", ack, ids)
+        info = self.struct(
+            "UMAA::SO::ResourceAllocation::ResourceAllocationPriorityInfo",
+            [("priorities", types.sequence[self.identifier, count]), ("resourceID", self.identifier)], ("resourceID",),
+        )
+        report = [("priorities", types.sequence[info, infos]), ("timeStamp", self.time), ("source", self.identifier)]
+        report = self.topic("ResourceAllocation", "ResourceAllocationPriorityReport", report, ("source",))
+        return [command, status, ack, report]

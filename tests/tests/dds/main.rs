@@ -1,6 +1,10 @@
 //! Two DDS domains, two gateways, the fleet's bus between them: peers of another implementation's binding know nothing of it.
 
+mod apart;
+mod order;
 mod peer;
+mod restart;
+mod topics;
 
 use peer::Stage;
 use serde_json::{Value, json};
@@ -69,26 +73,4 @@ fn who_comes_late_sees_what_a_native_reader_sees() {
     };
     assert_eq!(alive(&native), [(json!("last"), json!(at + 50))]);
     assert_eq!(alive(&bridged), alive(&native), "{bridged:?} {native:?}");
-}
-
-#[test]
-fn interleaved_instances_all_arrive_once_with_their_times() {
-    const COUNT: i64 = 600;
-    let Some(stage) = Stage::new("") else { return };
-    let (mut writer, mut reader) = (stage.peer(0), stage.peer(1));
-    let qos = json!({"keep_all": true, "topic_access": true});
-    writer.writer(STATUS, APPENDABLE, qos.clone());
-    reader.reader(STATUS, APPENDABLE, qos);
-    writer.matched(STATUS, 1);
-    reader.matched(STATUS, 1);
-    for number in 0..COUNT {
-        let sample = json!({"source": id(7), "sessionID": id((number % 5) as u8), "logMessage": number.to_string(),
-                            "commandStatus": "EXECUTING", "commandStatusReason": "UPDATED"});
-        writer.change("write", STATUS, sample, 1_000_000_000 + number);
-    }
-    // Of one take the other binding gives samples by instance, so that the order that is seen is that of the times within an instance.
-    let seen = reader.changes(COUNT as usize, |line| line[3].clone());
-    let mut times: Vec<i64> = seen.iter().filter_map(|(_, at)| at.as_i64()).collect();
-    times.sort_unstable();
-    assert_eq!(times, (0..COUNT).map(|number| 1_000_000_000 + number).collect::<Vec<_>>());
 }

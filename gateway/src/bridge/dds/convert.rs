@@ -41,6 +41,10 @@ pub(super) fn endpoint(found: &dds::Endpoint) -> Endpoint {
     }
 }
 
+fn nanoseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX)
+}
+
 pub(super) fn quality(qos: &dds::Qos) -> Quality {
     Quality {
         reliable: qos.reliable,
@@ -63,7 +67,15 @@ pub(super) fn quality(qos: &dds::Qos) -> Quality {
         },
         ordered: qos.presentation.ordered,
         by_source_time: qos.by_source_timestamp,
-        deadline_ms: qos.deadline.map(|deadline| deadline.as_millis() as u64),
+        coherent: qos.presentation.coherent,
+        deadline_ns: qos.deadline.map(nanoseconds),
+        latency_budget_ns: nanoseconds(qos.latency_budget),
+        liveliness: match qos.liveliness.0 {
+            dds::Liveliness::Automatic => 0,
+            dds::Liveliness::ManualByParticipant => 1,
+            dds::Liveliness::ManualByTopic => 2,
+        },
+        lease_ns: qos.liveliness.1.map(nanoseconds),
         partitions: qos.partitions.clone(),
         autodispose: qos.autodispose,
         xcdr: qos
@@ -92,8 +104,16 @@ pub(super) fn qos(quality: &Quality, writes: bool) -> dds::Qos {
         limits: dds::Limits::default(),
         durability_service: (kept, dds::Limits::default()),
         exclusive: quality.exclusive.then_some(0),
-        deadline: quality.deadline_ms.map(Duration::from_millis),
-        latency_budget: Duration::ZERO,
+        deadline: quality.deadline_ns.map(Duration::from_nanos),
+        latency_budget: Duration::from_nanos(quality.latency_budget_ns),
+        liveliness: (
+            match quality.liveliness {
+                0 => dds::Liveliness::Automatic,
+                1 => dds::Liveliness::ManualByParticipant,
+                _ => dds::Liveliness::ManualByTopic,
+            },
+            quality.lease_ns.map(Duration::from_nanos),
+        ),
         partitions: quality.partitions.clone(),
         presentation: dds::Presentation {
             access: match quality.access {
@@ -101,7 +121,7 @@ pub(super) fn qos(quality: &Quality, writes: bool) -> dds::Qos {
                 1 => dds::Access::Topic,
                 _ => dds::Access::Group,
             },
-            coherent: false,
+            coherent: quality.coherent,
             ordered: quality.ordered,
         },
         by_source_timestamp: quality.by_source_time,

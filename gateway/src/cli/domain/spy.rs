@@ -3,12 +3,14 @@
 use crate::cli::exit::Failure;
 use crate::cli::print_line;
 use crate::cli::within::Within;
+use crate::config::DdsVersion;
 use aldis_dds::{
     Change, Discovery, Endpoint, Guid, History, Incoming, Participant, ParticipantConfig, Qos, Reader, Side,
     Topic, TypeSource,
 };
 use aldis_envelope::codec::cdr::{KeySchema, Schema};
 use aldis_envelope::description::{Extensibility, Library};
+use aldis_services::map::dds::mismatches;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -25,6 +27,9 @@ pub(super) struct Spy {
     /// A folder of IDL files: samples of their types are shown with their members.
     #[arg(long)]
     idl: Option<PathBuf>,
+    /// The version of UMAA's own types: 5.2.1 or 6.0.
+    #[arg(long, default_value = "5.2.1", value_parser = version)]
+    umaa: DdsVersion,
     /// A file with a configuration of Cyclone DDS. Default: what `CYCLONEDDS_URI` says.
     #[arg(long)]
     cyclonedds: Option<PathBuf>,
@@ -34,6 +39,14 @@ pub(super) struct Spy {
     /// Watch for so long. Default: until it is stopped.
     #[arg(long = "for")]
     span: Option<Within>,
+}
+
+fn version(text: &str) -> Result<DdsVersion, String> {
+    match text {
+        "5.2.1" => Ok(DdsVersion::V5_2_1),
+        "6.0" => Ok(DdsVersion::V6_0),
+        _ => Err("5.2.1 and 6.0 are known".into()),
+    }
 }
 
 enum News {
@@ -55,7 +68,7 @@ struct Watching {
 impl Spy {
     pub(super) fn run(self) -> Result<(), Failure> {
         let failed = |why: &dyn std::fmt::Display| Failure::Failed(why.to_string());
-        let types = crate::config::dds_types(self.idl.as_deref()).map_err(Failure::Usage)?;
+        let types = crate::config::dds_types(self.umaa, self.idl.as_deref()).map_err(Failure::Usage)?;
         let read = |path: &PathBuf| {
             let text = std::fs::read_to_string(path);
             text.map_err(|why| Failure::Usage(format!("{}: {why}", path.display())))
@@ -122,7 +135,7 @@ impl Watching {
         {
             let (writer, reader) =
                 if endpoint.side == Side::Writer { (&endpoint, other) } else { (other, &endpoint) };
-            for (policy, offered, requested) in mismatches(&writer.qos, &reader.qos) {
+            for (policy, offered, requested) in disagreements(&writer.qos, &reader.qos) {
                 print_line(
                     json!({ "mismatch": policy, "topic": endpoint.topic, "writer": writer.guid.to_string(),
                                    "offered": offered, "reader": reader.guid.to_string(), "requested": requested }),
@@ -205,38 +218,14 @@ impl Watching {
     }
 }
 
-/// What a writer offers less of than a reader requests: policy, offered, requested.
-fn mismatches(offered: &Qos, requested: &Qos) -> Vec<(&'static str, String, String)> {
-    let mut found = Vec::new();
-    let mut look = |policy, agrees: bool, offered: String, requested: String| {
-        if !agrees {
-            found.push((policy, offered, requested));
-        }
-    };
-    let reliability = |qos: &Qos| if qos.reliable { "RELIABLE" } else { "BEST_EFFORT" }.to_owned();
-    look("RELIABILITY", offered.reliable >= requested.reliable, reliability(offered), reliability(requested));
-    let durability = |qos: &Qos| format!("{:?}", qos.durability);
-    look(
-        "DURABILITY",
-        offered.durability >= requested.durability,
-        durability(offered),
-        durability(requested),
-    );
-    let access = |qos: &Qos| format!("{:?}", qos.presentation);
-    let agrees = offered.presentation.access >= requested.presentation.access
-        && offered.presentation.ordered >= requested.presentation.ordered;
-    look("PRESENTATION", agrees, access(offered), access(requested));
-    let exclusive = |qos: &Qos| if qos.exclusive.is_some() { "EXCLUSIVE" } else { "SHARED" }.to_owned();
-    look("OWNERSHIP", exclusive(offered) == exclusive(requested), exclusive(offered), exclusive(requested));
-    let order = |qos: &Qos| if qos.by_source_timestamp { "BY_SOURCE" } else { "BY_RECEPTION" }.to_owned();
-    let agrees = offered.by_source_timestamp >= requested.by_source_timestamp;
-    look("DESTINATION_ORDER", agrees, order(offered), order(requested));
-    let shared = |names: &[String]| names.iter().any(|name| requested.partitions.contains(name));
-    let agrees = offered.partitions == requested.partitions || shared(&offered.partitions);
-    look("PARTITION", agrees, offered.partitions.join(","), requested.partitions.join(","));
-    let written = offered.representations.first();
-    let agrees = written.is_none_or(|written| requested.representations.contains(written));
-    let all = |qos: &Qos| format!("{:?}", qos.representations);
-    look("DATA_REPRESENTATION", agrees, all(offered), all(requested));
+/// What keeps a writer and a reader apart: policy, offered, requested. Partitions must have one in common.
+fn disagreements(writer: &Qos, reader: &Qos) -> Vec<(&'static str, String, String)> {
+    let (offered, requested) = (crate::bridge::dds::quality(writer), crate::bridge::dds::quality(reader));
+    let found = mismatches(&offered, &requested).into_iter();
+    let mut found: Vec<_> = found.map(|m| (m.policy, m.offered, m.requested)).collect();
+    let shared = offered.partitions.iter().any(|name| requested.partitions.contains(name));
+    if offered.partitions != requested.partitions && !shared {
+        found.push(("PARTITION", offered.partitions.join(","), requested.partitions.join(",")));
+    }
     found
 }

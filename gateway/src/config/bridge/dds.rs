@@ -4,8 +4,8 @@ use super::super::error::Fault;
 use super::super::text::PlainName;
 use super::common::{Common, queue_messages_max, stall_timeout_ms};
 use aldis_envelope::description::{Definition, Draft, Extensibility, Library, Member, Structure, Type};
-use aldis_envelope::{Dialect, ServiceId, umaa};
-use aldis_services::domain::{Pattern, QualityRule};
+use aldis_envelope::{Dialect, Group, ServiceId, umaa};
+use aldis_services::map::dds::{Glob, GlobError, QualityRule, Rules};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -23,9 +23,13 @@ pub(crate) struct Dds {
     pub(crate) common: Common,
     /// The rest as it is written.
     pub(crate) table: DdsTable,
+    /// Which topics cross.
+    pub(crate) topics: Rules,
+    /// Quality of service by topic.
+    pub(crate) rules: Vec<QualityRule>,
     /// The types that are described.
     pub(crate) types: Arc<Library>,
-    /// Those whose samples are messages of this project, member for member.
+    /// The types of topics that are described as the specification of the version has them.
     pub(crate) exact: Arc<BTreeSet<String>>,
 }
 
@@ -62,6 +66,10 @@ pub(crate) struct DdsTable {
     /// The version of UMAA that is spoken in it. Default: 5.2.1.
     #[serde(default)]
     pub(crate) version: DdsVersion,
+    /// Whether Support Operations of 6.0 are told to the fleet in 5.2.1, and the other way; what cannot be said is logged once.
+    /// Otherwise they cross as they are, between buses of 6.0 alone. Default: true.
+    #[serde(default = "translate")]
+    pub(crate) translate: bool,
     /// The partition; what is in others is not seen. Default: the one without a name. Bridges join their partition alone, and
     /// partitions of the same name across the fleet.
     #[serde(default, skip_serializing_if = "String::is_empty")]
@@ -91,6 +99,10 @@ pub(crate) struct DdsTable {
     stall_timeout_ms: u32,
 }
 
+fn translate() -> bool {
+    true
+}
+
 fn all_topics() -> Vec<String> {
     vec!["*".into()]
 }
@@ -107,14 +119,29 @@ impl TryFrom<DdsTable> for Dds {
             ));
         }
         super::in_range("domain", table.domain, 0..=DOMAIN_MAX, "(a domain's number)")?;
-        if let Some(empty) = table.qos.iter().position(|qos| qos.topics.is_empty()) {
-            let key = format!("qos.{empty}.topics");
-            return Err(Fault::new(
-                key,
-                "no topic has an empty name",
-                "give a name or a pattern such as \"*Report\"",
-            ));
-        }
+        let fault = |key: &str, why: GlobError| {
+            Fault::new(key, why.to_string(), "give a name or a pattern such as \"*Report\"")
+        };
+        let globs = |key: &str, texts: &[String]| {
+            texts
+                .iter()
+                .map(|text| text.parse::<Glob>())
+                .collect::<Result<_, _>>()
+                .map_err(|why| fault(key, why))
+        };
+        let topics = Rules { allow: globs("allow", &table.allow)?, deny: globs("deny", &table.deny)? };
+        let rule = |(place, qos): (usize, &DdsQos)| {
+            let topics = qos.topics.parse().map_err(|why| fault(&format!("qos.{place}.topics"), why))?;
+            Ok(QualityRule { topics, reliable: qos.reliable, durable: qos.durable, keep_last: qos.keep_last })
+        };
+        let rules = table.qos.iter().enumerate().map(rule).collect::<Result<_, Fault>>()?;
+        Group::new(&table.partition).map_err(|why| {
+            Fault::new(
+                "partition",
+                why.to_string(),
+                "give a partition that the fleet can carry as a source group",
+            )
+        })?;
         let common = Common {
             name: table.name.clone(),
             service: table.service,
@@ -128,7 +155,7 @@ impl TryFrom<DdsTable> for Dds {
             self_generated: true,
         };
         let (types, exact) = built_in(table.version);
-        Ok(Self { common: common.check()?, table, types, exact })
+        Ok(Self { common: common.check()?, table, topics, rules, types, exact })
     }
 }
 
@@ -145,7 +172,7 @@ pub(crate) enum DdsVersion {
     #[default]
     #[serde(rename = "5.2.1")]
     V5_2_1,
-    /// 6.0: carried as it is.
+    /// 6.0.
     #[serde(rename = "6.0")]
     V6_0,
 }
@@ -197,29 +224,27 @@ pub(crate) fn bench_types() -> Arc<Library> {
     Arc::new(with_bench_type(&Library::default()))
 }
 
-/// The types of both versions, and of a folder.
+/// The types of a version, and of a folder.
 #[cfg(feature = "dds")]
-pub(crate) fn dds_types(folder: Option<&Path>) -> Result<Arc<Library>, String> {
-    let (older, _) = built_in(DdsVersion::V5_2_1);
-    let Some(folder) = folder else { return Ok(older) };
+pub(crate) fn dds_types(version: DdsVersion, folder: Option<&Path>) -> Result<Arc<Library>, String> {
+    let (own, _) = built_in(version);
+    let Some(folder) = folder else { return Ok(own) };
     let mut files = BTreeMap::new();
     idl_files(folder, folder, &mut files).map_err(|why| format!("{}: {why}", folder.display()))?;
     let idl = aldis_envelope::idl::parse(&files, Extensibility::Appendable);
     let idl = idl.map_err(|errors| errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))?;
-    both(&idl.library, &older).map(Arc::new)
+    both(&idl.library, &own).map(Arc::new)
 }
 
-/// The types that every program knows. Those of the fleet's own version are messages of this project, member for member.
+/// The types that every program knows, and the names of those that topics have.
 fn built_in(version: DdsVersion) -> (Arc<Library>, Arc<BTreeSet<String>>) {
     // A test of theirs rules out that they are unsound.
-    match version {
-        DdsVersion::V5_2_1 => {
-            let topics = umaa::v5_2_1::described_topics().into_iter();
-            let exact = topics.map(|topic| topic.type_name).collect();
-            (Arc::new(with_bench_type(&umaa::v5_2_1::library().unwrap_or_default())), Arc::new(exact))
-        }
-        DdsVersion::V6_0 => (Arc::new(umaa::v6_0::library().unwrap_or_default()), Arc::default()),
-    }
+    let (library, topics) = match version {
+        DdsVersion::V5_2_1 => (umaa::v5_2_1::library(), umaa::v5_2_1::described_topics()),
+        DdsVersion::V6_0 => (umaa::v6_0::library(), umaa::v6_0::topics()),
+    };
+    let exact = topics.into_iter().map(|topic| topic.type_name).collect();
+    (Arc::new(with_bench_type(&library.unwrap_or_default())), Arc::new(exact))
 }
 
 #[cfg_attr(not(feature = "dds"), allow(dead_code, reason = "no bridge is made of it then"))]
@@ -253,22 +278,5 @@ impl Dds {
         );
         self.types = Arc::new(added.map_err(fault)?);
         Ok(())
-    }
-
-    /// Patterns of topics that cross, and of those that do not.
-    pub(crate) fn patterns(&self) -> (Vec<Pattern>, Vec<Pattern>) {
-        let patterns = |texts: &[String]| texts.iter().cloned().map(Pattern).collect();
-        (patterns(&self.table.allow), patterns(&self.table.deny))
-    }
-
-    /// Quality of service by topic.
-    pub(crate) fn rules(&self) -> Vec<QualityRule> {
-        let rule = |qos: &DdsQos| QualityRule {
-            topics: Pattern(qos.topics.clone()),
-            reliable: qos.reliable,
-            durable: qos.durable,
-            keep_last: qos.keep_last,
-        };
-        self.table.qos.iter().map(rule).collect()
     }
 }

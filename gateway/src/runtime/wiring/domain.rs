@@ -1,6 +1,6 @@
 //! Bridges to DDS domains: the service that has the meaning, and what the shell opens for it.
 
-use crate::config::{Bridge, Config, Dds};
+use crate::config::{Bridge, Config, Dds, DdsVersion};
 use aldis_envelope::Source;
 use aldis_services::domain::{Domain, DomainConfig};
 use aldis_services::{Service, ServiceSpec};
@@ -15,16 +15,15 @@ fn source(config: &Config, dds: &Dds) -> Source {
 }
 
 fn domain_config(config: &Config, dds: &Dds) -> DomainConfig {
-    let (allow, deny) = dds.patterns();
     DomainConfig {
         fleet: config.fleet.clone(),
-        entity: config.entities.own(),
+        source: source(config, dds),
         partition: dds.table.partition.clone(),
-        allow,
-        deny,
-        rules: dds.rules(),
+        topics: dds.topics.clone(),
+        rules: dds.rules.clone(),
         types: dds.types.clone(),
         exact: dds.exact.clone(),
+        translates: dds.table.version == DdsVersion::V6_0 && dds.table.translate,
         queue_max: dds.common.queue_messages_max as usize,
     }
 }

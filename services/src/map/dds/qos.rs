@@ -1,102 +1,89 @@
-//! The quality of service that a topic is written and read with: by the pattern of its name (umaa-so, Quality of service).
+//! The quality of service of a bridge's own endpoints: by the pattern of a topic's name (umaa-so, Quality of service; dds, What
+//! bites 6), and by what those have who are there.
 //!
 //! A writer of ours offers the strongest, so that every reader matches it. A reader of ours requests what the pattern needs, weakened
 //! to what the writers offer that discovery has found: one that requested less at once would lose samples, or the history that
 //! a late joiner is due, also where the writer keeps them (DDS 1.4, 2.2.3).
 
+use super::rules::QualityRule;
 use crate::dds::Pattern;
+use crate::service::domain::{Durable, Quality, Xcdr};
 use std::fmt;
 
-/// Whether samples may be lost.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-#[allow(missing_docs, reason = "the names are the standard's")]
-pub enum Reliability {
-    BestEffort,
-    Reliable,
+/// How many samples of an instance a writer keeps where all are wanted: what kits of UMAA vendors take.
+const KEPT_MAX: u32 = 500;
+
+/// What the patterns of UMAA and a configuration say of a topic.
+fn of_topic(topic: &str, rules: &[QualityRule], partition: &str) -> Quality {
+    let pattern = Pattern::of(topic);
+    let all = matches!(pattern, Some(Pattern::Status | Pattern::Log | Pattern::Element));
+    let mut quality = Quality {
+        reliable: true,
+        durable: Durable::TransientLocal,
+        keep_last: (!all).then_some(1),
+        samples_max: None,
+        exclusive: false,
+        access: 1,
+        ordered: true,
+        coherent: false,
+        by_source_time: true,
+        deadline_ns: None,
+        latency_budget_ns: 0,
+        liveliness: 0,
+        lease_ns: None,
+        partitions: if partition.is_empty() { Vec::new() } else { vec![partition.to_owned()] },
+        autodispose: false,
+        xcdr: Vec::new(),
+    };
+    if let Some(rule) = rules.iter().find(|rule| rule.topics.matches(topic)) {
+        rule.apply(&mut quality);
+    }
+    quality
 }
 
-/// What late joiners get.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-#[allow(missing_docs, reason = "the names are the standard's")]
-pub enum Durability {
-    Volatile,
-    TransientLocal,
-    Transient,
-    Persistent,
+/// Whether a configuration says how long samples of a topic last.
+fn is_ruled(topic: &str, rules: &[QualityRule]) -> bool {
+    rules.iter().find(|rule| rule.topics.matches(topic)).is_some_and(|rule| rule.durable.is_some())
 }
 
-/// How many samples of an instance are kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum History {
-    /// The newest so many.
-    KeepLast(u32),
-    /// All, within the limits of resources: so many samples of an instance.
-    KeepAll(u32),
+/// What a reader of ours requests of a topic: no more than the writers offer. It hands on what comes, in its writers' order, and so asks
+/// for none of it to be kept or put in order.
+pub fn requested(topic: &str, rules: &[QualityRule], partition: &str, writers: &[&Quality]) -> Quality {
+    let base = of_topic(topic, rules, partition);
+    // Entries of a log that are past are nobody's news, though a writer may keep them.
+    let is_log = Pattern::of(topic) == Some(Pattern::Log) && !is_ruled(topic, rules);
+    let needed = if is_log { Durable::Volatile } else { base.durable };
+    let durable = writers.iter().map(|offer| offer.durable).min().unwrap_or_default();
+    Quality {
+        reliable: base.reliable && writers.iter().all(|offer| offer.reliable),
+        durable: durable.min(needed),
+        access: 0,
+        ordered: false,
+        by_source_time: false,
+        exclusive: writers.iter().any(|offer| offer.exclusive),
+        latency_budget_ns: writers.iter().map(|offer| offer.latency_budget_ns).max().unwrap_or(0),
+        keep_last: None,
+        ..base
+    }
 }
 
-/// Who may write an instance.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[allow(missing_docs, reason = "the names are the standard's")]
-pub enum Ownership {
-    Shared,
-    Exclusive,
-}
-
-/// How far order and coherence reach.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-#[allow(missing_docs, reason = "the names are the standard's")]
-pub enum AccessScope {
-    Instance,
-    Topic,
-    Group,
-}
-
-/// The quality of service of an endpoint, as far as it decides whether two match, and what is kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Qos {
-    /// Whether samples may be lost.
-    pub reliability: Reliability,
-    /// What late joiners get.
-    pub durability: Durability,
-    /// What is kept.
-    pub history: History,
-    /// Who may write an instance.
-    pub ownership: Ownership,
-    /// How far order reaches.
-    pub access_scope: AccessScope,
-    /// Whether samples come in the order of their writing within that scope.
-    pub ordered_access: bool,
-    /// Whether several samples may belong together.
-    pub coherent_access: bool,
-    /// The longest time between two samples of an instance, in nanoseconds; none: no bound.
-    pub deadline: Option<u64>,
-    /// The longest time that a delivery should take, in nanoseconds.
-    pub latency_budget: u64,
-    /// How often a writer says that it lives, in nanoseconds; none: never.
-    pub liveliness_lease: Option<u64>,
-    /// 0 automatic, 1 by participant, 2 by topic.
-    pub liveliness_kind: u8,
-    /// 0 by reception, 1 by source.
-    pub destination_order: u8,
-}
-
-impl Default for Qos {
-    /// The standard's defaults of a reader.
-    fn default() -> Self {
-        Self {
-            reliability: Reliability::BestEffort,
-            durability: Durability::Volatile,
-            history: History::KeepLast(1),
-            ownership: Ownership::Shared,
-            access_scope: AccessScope::Instance,
-            ordered_access: false,
-            coherent_access: false,
-            deadline: None,
-            latency_budget: 0,
-            liveliness_lease: None,
-            liveliness_kind: 0,
-            destination_order: 0,
-        }
+/// What a writer of ours offers of a topic: the strongest, and what must be equal as those have it who hear it.
+pub fn offered(
+    topic: &str,
+    rules: &[QualityRule],
+    partition: &str,
+    readers: &[&Quality],
+    xcdr: Xcdr,
+) -> Quality {
+    let base = of_topic(topic, rules, partition);
+    Quality {
+        keep_last: Some(base.keep_last.unwrap_or(KEPT_MAX)),
+        exclusive: readers.iter().any(|request| request.exclusive),
+        deadline_ns: readers.iter().filter_map(|request| request.deadline_ns).min(),
+        // What is written says that its writer lives; between, Cyclone DDS says so where it is automatic.
+        lease_ns: readers.iter().filter_map(|request| request.lease_ns).min(),
+        xcdr: vec![xcdr],
+        ..base
     }
 }
 
@@ -117,102 +104,109 @@ impl fmt::Display for Mismatch {
     }
 }
 
-/// How many samples of an instance are kept where all are: vendors' kits use 500.
-const SAMPLES_MAX: u32 = 500;
-
-/// What a reader of ours requests for a topic, before it is [weakened](Qos::weakened_to) to what writers offer. `telemetry` where
-/// the configuration calls it a periodic report of high rate.
-pub fn requested(topic: &str, telemetry: bool) -> Qos {
-    let pattern = Pattern::of(topic);
-    let history = match pattern {
-        _ if telemetry => History::KeepLast(1),
-        Some(Pattern::Command | Pattern::State) => History::KeepLast(1),
-        // What is taken late must not have swallowed a transition, an entry or an element.
-        _ => History::KeepAll(SAMPLES_MAX),
-    };
-    let kept = !telemetry && !matches!(pattern, None | Some(Pattern::Log));
-    let durability = if kept { Durability::TransientLocal } else { Durability::Volatile };
-    let reliability = if telemetry { Reliability::BestEffort } else { Reliability::Reliable };
-    // An ordered topic whose reader does not ask for order would have its updates torn apart.
-    let ordered_access = pattern == Some(Pattern::Element);
-    let access_scope = if ordered_access { AccessScope::Topic } else { AccessScope::Instance };
-    Qos { reliability, durability, history, access_scope, ordered_access, ..Qos::default() }
-}
-
-impl Qos {
-    /// The same request with nothing in it that a writer does not offer, so that the two match.
-    pub fn weakened_to(self, offered: &Self) -> Self {
-        Self {
-            reliability: self.reliability.min(offered.reliability),
-            durability: self.durability.min(offered.durability),
-            access_scope: self.access_scope.min(offered.access_scope),
-            ordered_access: self.ordered_access && offered.ordered_access,
-            coherent_access: self.coherent_access && offered.coherent_access,
-            ownership: offered.ownership,
-            liveliness_kind: self.liveliness_kind.min(offered.liveliness_kind),
-            destination_order: self.destination_order.min(offered.destination_order),
-            deadline: self.deadline.and_then(|own| Some(own.max(offered.deadline?))),
-            liveliness_lease: self.liveliness_lease.and_then(|own| Some(own.max(offered.liveliness_lease?))),
-            latency_budget: self.latency_budget.max(offered.latency_budget),
-            history: self.history,
-        }
-    }
-}
-
-/// What a writer of ours offers for a topic.
-pub fn offered(topic: &str, telemetry: bool) -> Qos {
-    let pattern = Pattern::of(topic);
-    let history = match pattern {
-        _ if telemetry => History::KeepLast(1),
-        Some(Pattern::Command | Pattern::Response | Pattern::State) => History::KeepLast(1),
-        _ => History::KeepAll(SAMPLES_MAX),
-    };
-    let durability = if telemetry { Durability::Volatile } else { Durability::TransientLocal };
-    let reliability = if telemetry { Reliability::BestEffort } else { Reliability::Reliable };
-    Qos {
-        reliability,
-        durability,
-        history,
-        access_scope: AccessScope::Topic,
-        ordered_access: true,
-        destination_order: 1,
-        ..Qos::default()
-    }
-}
-
 /// Why a writer and a reader do not match; nothing where they do (DDS 1.4, 2.2.3, table of request and offer).
-pub fn mismatches(offered: &Qos, requested: &Qos) -> Vec<Mismatch> {
-    let mut found = Vec::new();
-    let mut check = |policy, matches: bool, offered: &dyn fmt::Debug, requested: &dyn fmt::Debug| {
-        if !matches {
-            let (offered, requested) = (format!("{offered:?}"), format!("{requested:?}"));
-            found.push(Mismatch { policy, offered, requested });
-        }
-    };
-    macro_rules! at_least {
-        ($policy:literal, $member:ident) => {
-            check($policy, offered.$member >= requested.$member, &offered.$member, &requested.$member)
-        };
-    }
-    at_least!("RELIABILITY", reliability);
-    at_least!("DURABILITY", durability);
-    at_least!("PRESENTATION access_scope", access_scope);
-    at_least!("PRESENTATION ordered_access", ordered_access);
-    at_least!("PRESENTATION coherent_access", coherent_access);
-    at_least!("LIVELINESS kind", liveliness_kind);
-    at_least!("DESTINATION_ORDER", destination_order);
-    let same = offered.ownership == requested.ownership;
-    check("OWNERSHIP", same, &offered.ownership, &requested.ownership);
+pub fn mismatches(offered: &Quality, requested: &Quality) -> Vec<Mismatch> {
     let within = |offered: Option<u64>, requested: Option<u64>| {
-        requested.is_none_or(|requested| offered.is_some_and(|offered| offered <= requested))
+        offered.unwrap_or(u64::MAX) <= requested.unwrap_or(u64::MAX)
     };
-    check("DEADLINE", within(offered.deadline, requested.deadline), &offered.deadline, &requested.deadline);
-    let lease = within(offered.liveliness_lease, requested.liveliness_lease);
-    check("LIVELINESS lease_duration", lease, &offered.liveliness_lease, &requested.liveliness_lease);
-    // A budget of zero is the least that a reader can ask for.
-    let budget = offered.latency_budget <= requested.latency_budget;
-    check("LATENCY_BUDGET", budget, &offered.latency_budget, &requested.latency_budget);
+    let duration =
+        |time: Option<u64>| time.map_or_else(|| "infinite".to_owned(), |time| format!("{time} ns"));
+    type Words = fn(&Quality) -> String;
+    let same: [(&str, bool, Words); 8] = [
+        ("RELIABILITY", offered.reliable >= requested.reliable, |q| reliability(q).to_owned()),
+        ("DURABILITY", offered.durable >= requested.durable, |q| durability(q).to_owned()),
+        ("OWNERSHIP", offered.exclusive == requested.exclusive, |q| ownership(q).to_owned()),
+        ("PRESENTATION access_scope", offered.access >= requested.access, |q| access(q).to_owned()),
+        ("PRESENTATION ordered_access", offered.ordered >= requested.ordered, |q| q.ordered.to_string()),
+        ("PRESENTATION coherent_access", offered.coherent >= requested.coherent, |q| q.coherent.to_string()),
+        ("DESTINATION_ORDER", offered.by_source_time >= requested.by_source_time, |q| order(q).to_owned()),
+        ("LIVELINESS kind", offered.liveliness >= requested.liveliness, |q| liveliness(q).to_owned()),
+    ];
+    let found = same.into_iter().filter(|(_, matches, _)| !matches);
+    let mut found: Vec<_> = found
+        .map(|(policy, _, words)| Mismatch { policy, offered: words(offered), requested: words(requested) })
+        .collect();
+    let times = [
+        ("DEADLINE", offered.deadline_ns, requested.deadline_ns),
+        // A budget of zero is the least that a reader can ask for.
+        ("LATENCY_BUDGET", Some(offered.latency_budget_ns), Some(requested.latency_budget_ns)),
+        ("LIVELINESS lease_duration", offered.lease_ns, requested.lease_ns),
+    ];
+    for (policy, offered, requested) in times {
+        if !within(offered, requested) {
+            found.push(Mismatch { policy, offered: duration(offered), requested: duration(requested) });
+        }
+    }
+    let in_common =
+        requested.xcdr.is_empty() || offered.xcdr.first().is_none_or(|first| requested.xcdr.contains(first));
+    if !in_common {
+        let policy = "DATA_REPRESENTATION";
+        found.push(Mismatch {
+            policy,
+            offered: representations(offered),
+            requested: representations(requested),
+        });
+    }
     found
+}
+
+fn reliability(quality: &Quality) -> &'static str {
+    if quality.reliable { "RELIABLE" } else { "BEST_EFFORT" }
+}
+
+fn durability(quality: &Quality) -> &'static str {
+    match quality.durable {
+        Durable::Volatile => "VOLATILE",
+        Durable::TransientLocal => "TRANSIENT_LOCAL",
+        Durable::Transient => "TRANSIENT",
+        Durable::Persistent => "PERSISTENT",
+    }
+}
+
+fn ownership(quality: &Quality) -> &'static str {
+    if quality.exclusive { "EXCLUSIVE" } else { "SHARED" }
+}
+
+fn access(quality: &Quality) -> &'static str {
+    ["INSTANCE", "TOPIC", "GROUP"][usize::from(quality.access.min(2))]
+}
+
+fn order(quality: &Quality) -> &'static str {
+    if quality.by_source_time { "BY_SOURCE_TIMESTAMP" } else { "BY_RECEPTION_TIMESTAMP" }
+}
+
+fn liveliness(quality: &Quality) -> &'static str {
+    ["AUTOMATIC", "MANUAL_BY_PARTICIPANT", "MANUAL_BY_TOPIC"][usize::from(quality.liveliness.min(2))]
+}
+
+fn representations(quality: &Quality) -> String {
+    let version = |xcdr: &Xcdr| if *xcdr == Xcdr::V1 { "XCDR1" } else { "XCDR2" };
+    quality.xcdr.iter().map(version).collect::<Vec<_>>().join("+")
+}
+
+/// In words, as DDS names it; what is as DDS has it by default is left out.
+pub fn in_words(quality: &Quality) -> String {
+    let kept = quality.keep_last.map_or_else(|| "KEEP_ALL".to_owned(), |count| format!("KEEP_LAST {count}"));
+    let mut words = vec![reliability(quality).to_owned(), durability(quality).to_owned(), kept];
+    if quality.exclusive {
+        words.push(ownership(quality).into());
+    }
+    if quality.access > 0 {
+        let ordered = if quality.ordered { " ordered" } else { "" };
+        let coherent = if quality.coherent { " coherent" } else { "" };
+        words.push(format!("{}{ordered}{coherent}", access(quality)));
+    }
+    if quality.by_source_time {
+        words.push(order(quality).into());
+    }
+    words.extend(quality.deadline_ns.map(|deadline| format!("DEADLINE {} ms", deadline as f64 / 1e6)));
+    if let Some(lease) = quality.lease_ns {
+        words.push(format!("LIVELINESS {} {} ms", liveliness(quality), lease as f64 / 1e6));
+    }
+    if !quality.xcdr.is_empty() {
+        words.push(representations(quality));
+    }
+    words.join(" ")
 }
 
 #[cfg(test)]
@@ -231,52 +225,71 @@ mod tests {
     ];
 
     #[test]
-    fn what_we_offer_matches_what_we_request_and_what_vendors_do() {
+    fn what_we_offer_matches_what_vendors_request_and_what_we_request_what_they_offer() {
         for topic in TOPICS {
-            assert_eq!(mismatches(&offered(topic, false), &requested(topic, false)), [], "{topic}");
-            let strict = Qos {
-                reliability: Reliability::Reliable,
-                durability: Durability::TransientLocal,
-                access_scope: AccessScope::Topic,
-                ordered_access: true,
-                ..Qos::default()
+            let own = offered(topic, &[], "", &[], Xcdr::V2);
+            let durable = Durable::TransientLocal;
+            let strict = Quality { durable, deadline_ns: Some(9), lease_ns: Some(5), ..own.clone() };
+            let own = offered(topic, &[], "", &[&strict], Xcdr::V2);
+            assert_eq!(mismatches(&own, &strict), [], "{topic}");
+            let weak = Quality {
+                reliable: false,
+                durable: Durable::Volatile,
+                exclusive: true,
+                access: 0,
+                ordered: false,
+                by_source_time: false,
+                latency_budget_ns: 7,
+                deadline_ns: None,
+                ..own
             };
-            assert_eq!(mismatches(&offered(topic, false), &strict), [], "{topic}");
-            let theirs = Qos {
-                ownership: Ownership::Exclusive,
-                latency_budget: 7,
-                deadline: Some(9),
-                ..Qos::default()
-            };
-            let request = Qos { deadline: Some(3), liveliness_lease: Some(1), ..requested(topic, false) };
-            assert_eq!(mismatches(&theirs, &request.weakened_to(&theirs)), [], "{topic}");
+            assert_eq!(mismatches(&weak, &requested(topic, &[], "", &[&weak])), [], "{topic}");
         }
-        let status = requested(TOPICS[1], false);
-        assert_eq!(status.history, History::KeepAll(500));
-        assert_eq!(offered(TOPICS[0], false).history, History::KeepLast(1));
-        assert_eq!(offered(TOPICS[6], true).reliability, Reliability::BestEffort);
+        let asked = |topic| requested(topic, &[], "", &[&offered(topic, &[], "", &[], Xcdr::V2)]).durable;
+        assert_eq!((asked(TOPICS[4]), asked(TOPICS[0])), (Durable::Volatile, Durable::TransientLocal));
+        assert_eq!(offered(TOPICS[1], &[], "", &[], Xcdr::V2).keep_last, Some(500));
+        assert_eq!(offered(TOPICS[0], &[], "", &[], Xcdr::V2).keep_last, Some(1));
+        let rule = QualityRule {
+            topics: "*Health*".parse().unwrap(),
+            reliable: Some(false),
+            durable: Some(false),
+            keep_last: Some(0),
+        };
+        let telemetry = offered(TOPICS[6], &[rule], "p", &[], Xcdr::V1);
+        assert_eq!(
+            in_words(&telemetry),
+            "BEST_EFFORT VOLATILE KEEP_LAST 500 TOPIC ordered BY_SOURCE_TIMESTAMP XCDR1"
+        );
+        assert_eq!(telemetry.partitions, ["p"]);
     }
 
     #[test]
     fn a_mismatch_names_both_sides() {
-        let writer = Qos { deadline: Some(2), ownership: Ownership::Exclusive, ..Qos::default() };
-        let reader = Qos {
-            reliability: Reliability::Reliable,
-            durability: Durability::Persistent,
-            deadline: Some(1),
-            liveliness_lease: Some(5),
-            latency_budget: 0,
-            ..Qos::default()
+        let strong = offered("any", &[], "", &[], Xcdr::V2);
+        let writer = Quality {
+            reliable: false,
+            durable: Durable::Volatile,
+            exclusive: true,
+            deadline_ns: Some(2),
+            ..strong.clone()
+        };
+        let reader = Quality {
+            durable: Durable::Persistent,
+            deadline_ns: Some(1),
+            lease_ns: Some(5),
+            xcdr: vec![Xcdr::V1],
+            ..strong
         };
         let told: Vec<_> = mismatches(&writer, &reader).iter().map(Mismatch::to_string).collect();
         assert_eq!(
             told,
             [
-                "RELIABILITY: BestEffort is offered, Reliable requested",
-                "DURABILITY: Volatile is offered, Persistent requested",
-                "OWNERSHIP: Exclusive is offered, Shared requested",
-                "DEADLINE: Some(2) is offered, Some(1) requested",
-                "LIVELINESS lease_duration: None is offered, Some(5) requested",
+                "RELIABILITY: BEST_EFFORT is offered, RELIABLE requested",
+                "DURABILITY: VOLATILE is offered, PERSISTENT requested",
+                "OWNERSHIP: EXCLUSIVE is offered, SHARED requested",
+                "DEADLINE: 2 ns is offered, 1 ns requested",
+                "LIVELINESS lease_duration: infinite is offered, 5 ns requested",
+                "DATA_REPRESENTATION: XCDR2 is offered, XCDR1 requested",
             ]
         );
     }

@@ -1,9 +1,13 @@
-//! Which topics are bridged: patterns that allow and deny.
+//! What a configuration says of topics by patterns of their names: which are bridged, and with which quality of service.
 
+use crate::service::domain::{Durable, Quality};
 use std::fmt;
 use std::str::FromStr;
 
-/// A pattern of topic names: `*` stands for any text, all else for itself.
+/// The longest pattern, in bytes: that of a name in an envelope.
+const BYTES_MAX: usize = 512;
+
+/// A pattern of names: `*` stands for any text, `?` for any character, all else for itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Glob {
     text: String,
@@ -16,7 +20,7 @@ pub enum GlobError {
     #[error("an empty pattern matches no topic: write `*` for all")]
     Empty,
     /// It would take long to match.
-    #[error("{0} bytes in a pattern, 512 are allowed")]
+    #[error("{0} bytes in a pattern, {BYTES_MAX} are allowed")]
     TooLong(usize),
 }
 
@@ -25,7 +29,7 @@ impl FromStr for Glob {
     fn from_str(text: &str) -> Result<Self, GlobError> {
         match text.len() {
             0 => Err(GlobError::Empty),
-            513.. => Err(GlobError::TooLong(text.len())),
+            length if length > BYTES_MAX => Err(GlobError::TooLong(length)),
             _ => Ok(Self { text: text.to_owned() }),
         }
     }
@@ -40,22 +44,33 @@ impl fmt::Display for Glob {
 impl Glob {
     /// Whether a name fits.
     pub fn matches(&self, name: &str) -> bool {
-        let mut parts = self.text.split('*');
-        // What stands before the first `*` must be the beginning.
-        let Some(mut rest) = parts.next().and_then(|first| name.strip_prefix(first)) else { return false };
-        let mut parts = parts.peekable();
-        if parts.peek().is_none() {
-            return rest.is_empty();
-        }
-        while let Some(part) = parts.next() {
-            if parts.peek().is_none() {
-                return rest.ends_with(part);
+        let (mut pattern, mut text) = (self.text.as_str(), name);
+        // What follows the last star, and what it has not reached yet.
+        let mut star: Option<(&str, &str)> = None;
+        loop {
+            let mut wanted = pattern.chars();
+            let mut found = text.chars();
+            match (wanted.next(), found.next()) {
+                (Some('*'), _) => {
+                    pattern = wanted.as_str();
+                    star = Some((pattern, text));
+                }
+                (None, None) => return true,
+                (Some(w), Some(f)) if w == '?' || w == f => {
+                    (pattern, text) = (wanted.as_str(), found.as_str())
+                }
+                _ => {
+                    // The star reaches one character further.
+                    let Some((after, reached)) = star else { return false };
+                    let mut rest = reached.chars();
+                    if rest.next().is_none() {
+                        return false;
+                    }
+                    (pattern, text) = (after, rest.as_str());
+                    star = Some((after, text));
+                }
             }
-            // The earliest place leaves the most for what follows.
-            let Some(at) = rest.find(part) else { return false };
-            rest = &rest[at + part.len()..];
         }
-        true
     }
 }
 
@@ -76,6 +91,32 @@ impl Rules {
     }
 }
 
+/// What a configuration says of the quality of service of topics.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct QualityRule {
+    /// Of which.
+    pub topics: Glob,
+    /// RELIABLE, or BEST_EFFORT.
+    pub reliable: Option<bool>,
+    /// TRANSIENT_LOCAL, or VOLATILE.
+    pub durable: Option<bool>,
+    /// HISTORY of so many samples of an instance; 0 is all.
+    pub keep_last: Option<u32>,
+}
+
+impl QualityRule {
+    /// Changes what the patterns of UMAA say.
+    pub(super) fn apply(&self, quality: &mut Quality) {
+        quality.reliable = self.reliable.unwrap_or(quality.reliable);
+        if let Some(durable) = self.durable {
+            quality.durable = if durable { Durable::TransientLocal } else { Durable::Volatile };
+        }
+        if let Some(count) = self.keep_last {
+            quality.keep_last = (count > 0).then_some(count);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -85,16 +126,23 @@ mod tests {
     }
 
     #[test]
-    fn a_star_stands_for_any_text() {
+    fn a_star_stands_for_any_text_and_a_question_mark_for_a_character() {
         let name = "UMAA::SO::HealthReport::HealthReport";
-        for good in ["*", name, "UMAA::*", "*HealthReport", "UMAA::*::Health*", "*SO*Report*", "U*A*t", "**"]
+        for good in
+            ["*", name, "UMAA::*", "*HealthReport", "UMAA::*::Health*", "*SO*Report*", "U*A*t", "**", "?MAA*"]
         {
             assert!(glob(good).matches(name), "{good}");
         }
-        for bad in ["UMAA", "UMAA::SO::*Command", "*SA*", "HealthReport*", "*Report::*Report*Report"] {
+        for bad in
+            ["UMAA", "UMAA::SO::*Command", "*SA*", "HealthReport*", "*Report::*Report*Report", "?UMAA*"]
+        {
             assert!(!glob(bad).matches(name), "{bad}");
         }
         assert!(!glob("aba*aba").matches("ababa"), "no part counts twice");
+        assert!(
+            glob("a*b*c").matches("aXbYbZc") && !glob("a*b*c").matches("acb") && glob("a?c").matches("aäc")
+        );
+        assert!(!glob("a?").matches("a") && glob("*").matches(""));
         assert_eq!("".parse::<Glob>(), Err(GlobError::Empty));
         assert_eq!("x".repeat(600).parse::<Glob>(), Err(GlobError::TooLong(600)));
     }

@@ -1,10 +1,12 @@
 //! One topic: its samples as envelopes, and envelopes as its samples.
 
-use aldis_envelope::codec::cdr::{CdrError, KeySchema, Representation, Schema};
+use super::error::{ExportError, ImportError, malformed};
+use super::sender::{Sender, address_of};
+use aldis_envelope::codec::cdr::{HEADER, KeySchema, Representation, Schema};
 use aldis_envelope::description::{Extensibility, Library};
 use aldis_envelope::name::NameError;
 use aldis_envelope::umaa::{self, TopicInfo};
-use aldis_envelope::{Change, ContentType, Instance, KeyHash, Label, Message, Name, Source, Wall};
+use aldis_envelope::{Change, ContentType, Instance, KeyHash, Label, Message, Name, Wall};
 use bytes::Bytes;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -54,86 +56,7 @@ pub struct Given {
     /// What it does to its instance.
     pub change: Change,
     /// All of it where it is put, its key alone otherwise; header included.
-    pub bytes: Vec<u8>,
-}
-
-/// Why a sample does not enter.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum ImportError {
-    /// Its bytes are no sample of the type.
-    #[error("a sample of {topic} is malformed: {why}")]
-    Malformed {
-        /// The topic.
-        topic: String,
-        /// What is wrong.
-        why: Box<CdrError>,
-    },
-    /// An instance ends of which the key was never told.
-    #[error(
-        "an instance of {topic} ends, of which only the key hash {hash} is told: have its writer send serialized keys"
-    )]
-    UnknownKey {
-        /// The topic.
-        topic: String,
-        /// The hash.
-        hash: KeyHash,
-    },
-    /// The type is not known, so that its keys cannot be read.
-    #[error(
-        "the type of {topic} is not known: give its IDL by `idl`, or have its writer send type information"
-    )]
-    UnknownType {
-        /// The topic.
-        topic: String,
-    },
-}
-
-/// Why an envelope does not leave.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum ExportError {
-    /// Its content is not of the topic's type.
-    #[error("a content is no sample of {topic}: {why}")]
-    NoSample {
-        /// The topic.
-        topic: String,
-        /// What is wrong.
-        why: Box<CdrError>,
-    },
-    /// Its content is in no form that a topic has.
-    #[error("a content of type {found} on {topic}: `umaa` and `cdr` are written")]
-    OtherContent {
-        /// The topic.
-        topic: String,
-        /// The type.
-        found: String,
-    },
-    /// An instance ends of which the key is not known.
-    #[error("an instance of {topic} ends, of which only the key hash {hash} is known")]
-    UnknownKey {
-        /// The topic.
-        topic: String,
-        /// The hash; of no instance where there is none.
-        hash: KeyHash,
-    },
-    /// Writing it anew would lose what its type has more.
-    #[error(
-        "a sample of {topic} has other members than its type here, so it leaves in its own representation alone"
-    )]
-    OtherVersion {
-        /// The topic.
-        topic: String,
-    },
-    /// The type is not known.
-    #[error("the type of {topic} is not known here, so its samples leave only as they came")]
-    UnknownType {
-        /// The topic.
-        topic: String,
-    },
-}
-
-/// Says of which topic a sample is malformed.
-pub(super) fn malformed(topic: &str) -> impl Fn(Box<CdrError>) -> ImportError {
-    move |why| ImportError::Malformed { topic: topic.to_owned(), why }
+    pub bytes: Bytes,
 }
 
 /// A type as it is written on the bus: appendable or final.
@@ -163,28 +86,31 @@ pub struct TopicMap {
 }
 
 impl TopicMap {
-    /// A topic of Support Operations in version 5.2.1 becomes `umaa` contents, every other stays `cdr`. `source` is the bridge's.
-    /// A type that the library lacks or that is mutable is carried as it is.
+    /// A topic of Support Operations in version 5.2.1 becomes `umaa` contents, every other stays `cdr`. A type that the library lacks or
+    /// that is mutable is carried as it is.
     ///
     /// # Errors
     /// [`NameError`] where the topic's name is none that an envelope can have.
-    pub fn new(topic: &str, type_name: &str, library: &Library, source: Source) -> Result<Self, NameError> {
-        let name = Name::new(topic)?;
-        let label = |content_type| Arc::new(Label::broadcast(content_type, name.clone(), source));
+    pub fn new(topic: &str, type_name: &str, library: &Library, sender: &Sender) -> Result<Self, NameError> {
+        let name = Name::new(&address_of(topic))?;
         let schema = Schema::new(library, type_name).ok();
         let shapes = schema.map(|schema| {
             let closed = schema.as_final();
             [Shape::new(schema), Shape::new(closed)]
         });
-        let info = umaa::topic(topic).filter(|info| info.type_name == type_name);
         Ok(Self {
             name: topic.to_owned(),
-            ours: label(ContentType::Umaa),
-            theirs: label(ContentType::Cdr),
+            ours: sender.label(ContentType::Umaa, &name),
+            theirs: sender.label(ContentType::Cdr, &name),
             shapes,
-            info,
+            info: umaa::topic(topic).filter(|info| info.type_name == type_name),
             keys: BTreeMap::new(),
         })
+    }
+
+    /// The same for a type that has its name of Support Operations and is another: all of it stays `cdr`.
+    pub fn as_it_comes(self) -> Self {
+        Self { info: None, ..self }
     }
 
     /// The topic's name.
@@ -217,6 +143,31 @@ impl TopicMap {
         message.change = taken.change;
         message.instance = instance.map(Arc::new);
         Ok(Imported { message, source_time: taken.source_time })
+    }
+
+    /// The envelope that ends an instance.
+    pub fn end(&self, change: Change, instance: Arc<Instance>) -> Message {
+        Message { change, instance: Some(instance), ..Message::new(self.ending(), Bytes::new()) }
+    }
+
+    /// The key of a whole sample, as a sample that holds it alone; none where its type has none.
+    ///
+    /// # Errors
+    /// [`ExportError::NoSample`] where it is none.
+    pub fn key_sample(
+        &self,
+        sample: &[u8],
+        representation: Representation,
+    ) -> Result<Option<Bytes>, ExportError> {
+        let Some((shape, keys)) = self.shape_of(sample).and_then(|shape| Some((shape, shape.keys.as_ref()?)))
+        else {
+            return Ok(None);
+        };
+        let no_sample = |why| ExportError::NoSample { topic: self.name.clone(), why };
+        let Some(key) = keys.of_sample(&shape.schema, sample).map_err(no_sample)?.key else {
+            return Ok(None);
+        };
+        keys.key_sample(&key, representation).map(|bytes| Some(bytes.into())).map_err(no_sample)
     }
 
     /// The label of messages without a content: that of what the topic's contents usually are.
@@ -312,7 +263,7 @@ impl TopicMap {
             .key_sample(&key, representation)
             .map_err(|why| ExportError::NoSample { topic: topic(), why })?;
         self.note(change, Some(instance));
-        Ok(Given { change, bytes })
+        Ok(Given { change, bytes: bytes.into() })
     }
 
     fn shape_for(&self, representation: Representation) -> Option<&Shape> {
@@ -320,19 +271,21 @@ impl TopicMap {
         self.shape_of(&[high, low])
     }
 
-    fn written(&self, message: &Message, representation: Representation) -> Result<Vec<u8>, ExportError> {
+    fn written(&self, message: &Message, representation: Representation) -> Result<Bytes, ExportError> {
         let topic = || self.name.clone();
         let no_sample = |why| ExportError::NoSample { topic: topic(), why };
         let unknown = || ExportError::UnknownType { topic: topic() };
-        match &message.label.attributes.content_type {
+        let bytes = match &message.label.attributes.content_type {
             ContentType::Umaa => {
                 let shape = self.shape_for(representation).ok_or_else(unknown)?;
-                shape.schema.of_postcard(&message.content, representation).map_err(no_sample)
+                shape.schema.of_postcard(&message.content, representation).map_err(no_sample)?
             }
             ContentType::Cdr => {
-                let id = representation.id().to_be_bytes();
-                if message.content.starts_with(&id) {
-                    return Ok(message.content.to_vec());
+                let head = message.content.first_chunk::<HEADER>();
+                let found =
+                    head.and_then(|head| Representation::of_id(u16::from_be_bytes([head[0], head[1]])));
+                if found.is_some_and(|found| found.form == representation.form) {
+                    return Ok(message.content.clone());
                 }
                 // Another representation than the writer's: read by the one, written by the other.
                 let shape = self.shape_of(&message.content).ok_or_else(unknown)?;
@@ -341,9 +294,10 @@ impl TopicMap {
                     return Err(ExportError::OtherVersion { topic: topic() });
                 }
                 let wanted = self.shape_for(representation).ok_or_else(unknown)?;
-                wanted.schema.write(&sample.value, representation).map_err(no_sample)
+                wanted.schema.write(&sample.value, representation).map_err(no_sample)?
             }
-            other => Err(ExportError::OtherContent { topic: topic(), found: format!("{other:?}") }),
-        }
+            other => return Err(ExportError::OtherContent { topic: topic(), found: format!("{other:?}") }),
+        };
+        Ok(bytes.into())
     }
 }

@@ -62,6 +62,12 @@ pub enum Lost {
         /// The member.
         member: String,
     },
+    /// A sample has members that its type here does not have.
+    #[error("{topic}: members that its type does not have here are not carried")]
+    Members {
+        /// The topic.
+        topic: String,
+    },
     /// One code of a resource's health ended while others are left, which in 5.2.1 are one instance.
     #[error("{topic}: the health of one code ended, others of the same resource are left")]
     OneOfSeveralCodes {
@@ -164,6 +170,16 @@ impl Translator {
         Outcome { samples, lost }
     }
 
+    /// The sample that is translated next has members that its type here does not have.
+    pub(super) fn more_members(&mut self, topic: &str) {
+        self.lost.push(Lost::Members { topic: topic.to_owned() });
+    }
+
+    /// Forgets what was said on the bus of configurations' resources.
+    pub(super) fn say_all_again(&mut self) {
+        self.said.clear();
+    }
+
     fn plain_to_older(&mut self, sample: &Sample, topic: &str) -> Result<Sample, Lost> {
         let value = self.converted(sample, &sample.topic, false)?;
         Ok(Sample { topic: topic.to_owned(), change: sample.change, value })
@@ -183,6 +199,11 @@ impl Lost {
             other => other,
         }
     }
+}
+
+/// The topic of 5.2.1 that a topic of 6.0 belongs to: its own, or that of what it is an element of.
+pub(super) fn older_topic(topic: &str) -> Option<&'static str> {
+    if topic == v6_0::RESOURCES_ELEMENT { Some(resources::CONFIG) } else { topic_of_newer(topic) }
 }
 
 /// The topic of 5.2.1 whose type has the name of a topic of 6.0.
