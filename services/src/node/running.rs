@@ -15,7 +15,14 @@ fn work(place: usize, message: Message) -> Work {
 
 /// What the stamp says of a message that was said elsewhere.
 fn said_at(source_time: Wall) -> Passed {
-    Passed { source_time, lifespan_left_ms: None, priority: Priority::Data, via: Vec::new(), delivery: None }
+    Passed {
+        source_time,
+        lifespan_left_ms: None,
+        priority: Priority::Data,
+        via: Vec::new(),
+        delivery: None,
+        before: None,
+    }
 }
 
 impl Node {
