@@ -177,8 +177,6 @@ pub struct Link {
     lower_credit: i64,
     bulk_credit: i64,
     next_probe: Monotonic,
-    /// When the peer was last looked for.
-    looked: Monotonic,
     probes: u32,
     heard: bool,
     keys: RecordKeys,
@@ -233,7 +231,6 @@ impl Link {
             lower_credit: 0,
             bulk_credit: 0,
             next_probe: Monotonic::START,
-            looked: Monotonic::START,
             probes: 0,
             heard: false,
             records: Vec::new(),

@@ -14,13 +14,6 @@ use std::time::Duration;
 /// While nobody is heard and something waits, a frame goes out so often, at least twice a second.
 const PROBE_EVERY: Duration = Duration::from_millis(100);
 
-/// Who has nothing to send looks for the peer too, so that it is found half a round trip sooner: first as often as who has, and once
-/// the silence is long, a pause of this part of it.
-const LOOK_PART: u32 = 6_000;
-
-/// The longest such pause.
-const LOOK_SELDOM: Duration = Duration::from_secs(5);
-
 /// Of the frames that look for the peer, every so many says hello, in case the peer does not know this place.
 const HELLO_EVERY: u32 = 10;
 
@@ -36,9 +29,7 @@ struct Reasons {
     probing: bool,
     /// Something must go out even if there is no data.
     must: bool,
-    /// The peer is looked for.
-    look: bool,
-    /// The peer is asked to answer. Who has nothing to send is content to be heard.
+    /// The peer is asked to answer.
     ask: bool,
 }
 
@@ -78,29 +69,18 @@ impl Link {
             || !self.states.is_settled()
     }
 
-    /// When the peer, while it is not heard, is looked for next; none where it is not.
-    fn look_at(&self, now: Monotonic) -> Option<Monotonic> {
-        if self.has_work() {
-            return Some(self.next_probe);
-        }
-        let last = self.paths.iter().filter_map(|path| path.last_heard).max().filter(|_| !self.heard)?;
-        let pause = ((now - last) / LOOK_PART).clamp(PROBE_EVERY, LOOK_SELDOM);
-        Some(self.next_probe.max(self.looked + pause))
-    }
-
     fn reasons(&self, now: Monotonic, index: usize) -> Option<Reasons> {
         let path = &self.paths[index];
         let active = self.active(now) == Some(index);
         let probing = !path.is_heard(now);
-        let probe = probing && active && self.look_at(now).is_some_and(|at| at <= now);
+        let probe = probing && active && self.has_work() && self.next_probe <= now;
         let data = active && (if probing { probe && self.outbox.is_due(now) } else { self.is_due(now) });
-        let look = probe && !data;
-        let ask = look && self.has_work();
+        let ask = probe && !data;
         let hello = self.session.hello_due || self.session.hello_again().is_some_and(|at| at <= now);
         let acks = path.acks.copies > 0 && path.acks.due.is_some_and(|due| due <= now);
         let alive = path.keep_alive_at() <= now;
-        let must = hello || acks || alive || look;
-        (must || data).then_some(Reasons { data, probing, must, look, ask })
+        let must = hello || acks || alive || ask;
+        (must || data).then_some(Reasons { data, probing, must, ask })
     }
 
     /// Whether data is to go out on a carrier that is heard.
@@ -143,7 +123,7 @@ impl Link {
     fn build(&mut self, now: Now, index: usize) -> Option<Vec<u8>> {
         let reasons = self.reasons(now.monotonic, index)?;
         let number = self.paths[index].sent.next;
-        let looks = reasons.look && self.probes.is_multiple_of(HELLO_EVERY);
+        let looks = reasons.probing && reasons.ask && self.probes.is_multiple_of(HELLO_EVERY);
         let says_hello = self.session.asks() || self.session.hello_due || looks;
         let hello = says_hello.then(|| self.hello(number));
         let mut clear = Vec::with_capacity(self.paths[index].config.mtu);
@@ -200,11 +180,10 @@ impl Link {
         if says_hello {
             (self.session.hello_due, self.session.hello_at) = (false, now);
         }
-        if reasons.probing && (reasons.look || reasons.data) {
+        if reasons.probing && (reasons.ask || reasons.data) {
             self.probes = self.probes.wrapping_add(1);
             let path = self.active(now).map(|index| self.paths[index].airtime(bytes)).unwrap_or_default();
-            let pause = if reasons.look { (path * 20).max(PROBE_EVERY) } else { (path * 5).max(PROBE_EVERY) };
-            self.looked = now;
+            let pause = if reasons.ask { (path * 20).max(PROBE_EVERY) } else { (path * 5).max(PROBE_EVERY) };
             self.next_probe = now + pause;
         }
     }
@@ -252,7 +231,7 @@ impl Link {
                 at(self.is_due(now).then_some(now));
                 at(self.outbox.next_due(now));
             } else {
-                at(self.look_at(now));
+                at(self.has_work().then_some(self.next_probe));
             }
         }
         wish
