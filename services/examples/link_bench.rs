@@ -17,5 +17,6 @@ fn main() {
     for row in bench(&Bench { profile, keyed, part, seed, only }) {
         let met = if row.met { "met   " } else { "MISSED" };
         println!("{:4} {met} {}\n            {}", row.name, row.measured, row.goal);
+        row.reason.iter().for_each(|reason| println!("            why: {reason}"));
     }
 }

@@ -17,7 +17,7 @@ pub use pattern::Pattern;
 pub use qos::{Durability, Keep, Qos, TopicRule, Topics};
 pub use reading::{Reading, Step};
 pub use record::{Record, RecordError};
-pub use writers::{Confirmed, Writers};
+pub use writers::{Confirmed, Writers, name_of};
 
 use aldis_envelope::{BootId, EntityId};
 

@@ -43,6 +43,7 @@ pub use session::sender_of;
 use crate::counters::counters;
 use aldis_envelope::{BootId, EntityId, Monotonic, Now};
 use bulk::{BulkIn, BulkOut};
+use feedback::InDoubt;
 use held::Held;
 use inbox::Inbox;
 use journal::AfterWrite;
@@ -160,8 +161,8 @@ pub struct Link {
     inbox: Inbox,
     /// Voids that are on the air.
     voids_on_air: Ranges,
-    /// Expired commands of which no word came back, with what was said of them.
-    in_doubt: BTreeMap<u64, (Ticket, Monotonic, u32)>,
+    /// Expired commands of which no word came back.
+    in_doubt: BTreeMap<u64, InDoubt>,
     names: Names,
     peer_names: Names,
     states: States,

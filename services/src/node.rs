@@ -79,6 +79,8 @@ enum Origin {
 struct Passed {
     /// Its number in the link, where it is to be answered.
     delivery: Option<DeliveryId>,
+    /// The life of the node that stamped it before, and its number in its stream there; none where it is not from a link.
+    before: Option<(BootId, u64)>,
     source_time: Wall,
     lifespan_left_ms: Option<u32>,
     priority: Priority,

@@ -1,7 +1,8 @@
 //! What a node says of its links: requests to service 1 and what they are answered with.
 
+use super::dds::StreamName;
 use crate::call::CallId;
-use crate::id::{EntityId, Source};
+use crate::id::{BootId, EntityId, Source};
 use serde::{Deserialize, Serialize};
 
 /// Asks service 1 how its links do; no content. Answered with a list of [`LinkStatus`].
@@ -22,6 +23,23 @@ pub const LINK_SILENCE: &str = "aldis.LinkSilence";
 pub const TICKET: &str = "aldis.Ticket";
 /// The services of a node that are alive: what it tells the other end of a link. The content is a list of [`Source`].
 pub const SERVICES: &str = "aldis.link.Services";
+/// Asks the other end of a link to say when all readers there have a sample; the content is a [`ConfirmAsk`].
+pub const CONFIRM_ASK: &str = "aldis.link.ConfirmAsk";
+/// All readers there have it; the content is the number of the [`ConfirmAsk`]. Where they have not in time, no word comes.
+pub const CONFIRMED: &str = "aldis.link.Confirmed";
+
+/// A sample of which the sender's node wants to know when all readers beyond the link have it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ConfirmAsk {
+    /// The number of this question: the answer names it.
+    pub number: u64,
+    /// The stream of the sample.
+    pub stream: StreamName,
+    /// The life of the node that asks, which has stamped the sample.
+    pub boot: BootId,
+    /// The sample's number in its stream.
+    pub sequence: u64,
+}
 
 /// How a link does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

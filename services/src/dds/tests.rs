@@ -243,21 +243,21 @@ fn a_confirmation_waits_for_every_reliable_reader_and_for_no_longer_than_it_may(
     pair.run_for(Duration::from_millis(100));
     let sample = pair.write(1, Change::Put);
     let source = sample.message.label.source();
-    assert_eq!(pair.writers.confirm(source, 7, &sample, pair.now + Duration::from_secs(5)), None);
+    assert_eq!(pair.writers.confirm((source, 7), &sample, &[], pair.now + Duration::from_secs(5)), None);
     let confirm = Confirm { to: BootId(1), upto: vec![(writers::name_of(&sample).unwrap(), 1)] };
     let confirmed = pair.writers.confirmed(pair.now, participant(5), &confirm);
     assert_eq!(confirmed, [Confirmed { source, number: 7, outcome: Ok(()) }]);
     // Who has it already does not hold it up; who has it not is named.
-    assert!(pair.writers.confirm(source, 8, &sample, pair.now).is_some());
+    assert!(pair.writers.confirm((source, 8), &sample, &[], pair.now).is_some());
     let sample = pair.write(1, Change::Put);
-    assert_eq!(pair.writers.confirm(source, 9, &sample, pair.now + Duration::from_secs(5)), None);
+    assert_eq!(pair.writers.confirm((source, 9), &sample, &[], pair.now + Duration::from_secs(5)), None);
     let (_, confirmed) = pair.writers.due(pair.now + Duration::from_secs(5));
     let missing = vec![EntityId::new(5).unwrap()];
     let outcome = Err(crate::service::Unconfirmed::Missing { missing });
     assert_eq!(confirmed, [Confirmed { source, number: 9, outcome }]);
     // A reader that is not heard for its lease is waited for no longer.
     let sample = pair.write(1, Change::Put);
-    assert_eq!(pair.writers.confirm(source, 10, &sample, pair.now + Duration::from_secs(60)), None);
+    assert_eq!(pair.writers.confirm((source, 10), &sample, &[], pair.now + Duration::from_secs(60)), None);
     let (_, confirmed) = pair.writers.due(pair.now + Duration::from_secs(11));
     assert_eq!(confirmed, [Confirmed { source, number: 10, outcome: Ok(()) }]);
 }

@@ -1,5 +1,6 @@
 //! What the sources of this node have written, who reads it, and how far each reader has it.
 
+mod confirming;
 mod records;
 
 use super::Participant;
@@ -124,42 +125,6 @@ impl Writers {
         }
         stream.history.take_forgotten(&mut self.forgotten);
         stream.history.take_shed()
-    }
-
-    /// Has a service told once every reliable reader of a stream has the sample with a sequence.
-    pub fn confirm(
-        &mut self,
-        source: Source,
-        number: u64,
-        sample: &Envelope,
-        deadline: Monotonic,
-    ) -> Option<Confirmed> {
-        let stream = name_of(sample)?;
-        let readers = self.streams.get(&stream).map(|stream| stream.readers.as_slice()).unwrap_or_default();
-        let sequence = sample.stamp.sequence;
-        let missing: BTreeSet<_> = readers
-            .iter()
-            .filter(|p| {
-                self.readers.get(p).is_some_and(|r| r.announced.reliable && r.has(&stream) < sequence)
-            })
-            .copied()
-            .collect();
-        if missing.is_empty() {
-            return Some(Confirmed { source, number, outcome: Ok(()) });
-        }
-        wake_by(&mut self.wake, deadline);
-        self.waiting.push(Waiting { source, number, stream, sequence, missing, deadline });
-        None
-    }
-
-    /// Where the stream of a sample stands, for the readers that are waited for: what they are asked to confirm at once.
-    pub fn awaited(&self, sample: &Envelope) -> Vec<(Participant, Streams)> {
-        let Some(name) = name_of(sample) else { return Vec::new() };
-        let sequence = sample.stamp.sequence;
-        let waiting = self.waiting.iter().filter(|w| w.stream == name && w.sequence == sequence);
-        let missing: BTreeSet<_> = waiting.flat_map(|waiting| waiting.missing.iter().copied()).collect();
-        let ends = vec![(name, sequence)];
-        missing.into_iter().map(|p| (p, Streams { to: p.boot, answers: None, ends: ends.clone() })).collect()
     }
 
     /// A participant announces its readers. What its streams hold is the answer. Reliable readers have one life at a time, so
@@ -382,7 +347,8 @@ fn wake_by(wake: &mut Option<Monotonic>, at: Monotonic) {
     *wake = Some(wake.map_or(at, |wake| wake.min(at)));
 }
 
-pub(super) fn name_of(envelope: &Envelope) -> Option<StreamName> {
+/// The stream of a sample; none where it is not for all.
+pub fn name_of(envelope: &Envelope) -> Option<StreamName> {
     let label = &envelope.message.label;
     match &label.address {
         Address::Name(topic) if label.is_broadcast() => {

@@ -2,7 +2,8 @@
 
 use super::frame::Item;
 use super::names::name_of;
-use super::outbox::Left;
+use super::outbox::{Entry, Left};
+use super::ranges::Ranges;
 use super::received::acknowledged;
 use super::record::Kind;
 use super::sent::{Carried, SentFrame};
@@ -15,6 +16,17 @@ pub(super) const DELAY_UNIT: Duration = Duration::from_millis(8);
 
 /// How many expired commands without word are remembered, so that late word is not lost.
 const IN_DOUBT_MAX: usize = 1_024;
+
+/// An expired command of which no word came back, with what was said of it.
+#[derive(Debug)]
+pub(super) struct InDoubt {
+    ticket: Ticket,
+    accepted: Monotonic,
+    tries: u32,
+    /// Of its bytes, those that arrived.
+    acknowledged: Ranges,
+    length: u64,
+}
 
 /// The part of a round trip after which the last samples of a re-synchronisation go again.
 const AGAIN_AFTER: u32 = 2;
@@ -44,8 +56,13 @@ impl Link {
     fn on_arrived(&mut self, now: Monotonic, carried: Carried, effects: &mut Vec<Effect>) {
         match carried {
             Carried::Command { number, start, end } => {
-                if let Some((ticket, accepted, tries)) = self.in_doubt.remove(&number) {
-                    self.tell(ticket, TicketState::Delivered { after: now - accepted, tries }, effects);
+                if let Some(doubt) = self.in_doubt.get_mut(&number) {
+                    doubt.acknowledged.insert_range(start.into(), end.into());
+                    if doubt.acknowledged.covers(0, doubt.length) {
+                        let InDoubt { ticket, accepted, tries, .. } = *doubt;
+                        self.in_doubt.remove(&number);
+                        self.tell(ticket, TicketState::Delivered { after: now - accepted, tries }, effects);
+                    }
                 }
                 if let Some(left) = self.outbox.arrived(number, start, end) {
                     self.on_through(now, left, effects);
@@ -133,13 +150,16 @@ impl Link {
         while let Some(left) = self.outbox.expire(now.monotonic) {
             self.counters.commands_expired += 1;
             self.records.push(self.keys.forget(Kind::Outgoing, left.number));
-            if left.tries > 0 && left.entry.ticket != Ticket::default() {
-                self.in_doubt.insert(left.number, (left.entry.ticket, left.entry.accepted, left.tries));
+            let Left { number, entry, tries, acknowledged } = left;
+            if tries > 0 && entry.ticket != Ticket::default() {
+                let Entry { ticket, accepted, body, .. } = &entry;
+                let (ticket, accepted, length) = (*ticket, *accepted, body.len() as u64);
+                self.in_doubt.insert(number, InDoubt { ticket, accepted, tries, acknowledged, length });
                 while self.in_doubt.len() > IN_DOUBT_MAX {
                     self.in_doubt.pop_first();
                 }
             }
-            self.tell(left.entry.ticket, TicketState::Expired { tries: left.tries }, effects);
+            self.tell(entry.ticket, TicketState::Expired { tries }, effects);
         }
         self.states.tick(now.monotonic);
         let idle = !self.is_due(now.monotonic);

@@ -1,11 +1,14 @@
 //! Commands that come: taken once, made safe, handed over in the order of their streams.
 
+mod order;
+
 use super::frame::CommandItem;
 use super::outbox::LIFESPAN_UNIT;
 use super::ranges::Ranges;
 use super::wire::{Malformed, Reader, put_varint, put_zigzag};
 use aldis_envelope::{Monotonic, Now};
 use bytes::Bytes;
+use order::Order;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
@@ -28,6 +31,8 @@ const PIECES_MAX: usize = 1_024;
 #[derive(Debug, Clone)]
 pub(super) struct Incoming {
     pub(super) after: u64,
+    /// The number of its label, which is its stream.
+    stream: u32,
     /// When its lifespan ends here.
     pub(super) expires: Option<Monotonic>,
     pub(super) body: Bytes,
@@ -39,6 +44,14 @@ pub(super) struct Incoming {
     pub(super) recovered: bool,
 }
 
+impl Incoming {
+    fn new(after: u64, expires: Option<Monotonic>, body: Bytes) -> Self {
+        // What does not begin with a label is dropped when its turn comes.
+        let stream = Reader::new(&body, "a command").varint_u32().unwrap_or(u32::MAX);
+        Self { after, stream, expires, body, safe: false, handed: false, recovered: false }
+    }
+}
+
 /// What became of an item.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Took {
@@ -48,7 +61,7 @@ pub(super) enum Took {
     Piece,
     /// It came before. Whether its record is written.
     Again(bool),
-    /// It came after its lifespan, or there is no room. The frame is not acknowledged.
+    /// It came after its lifespan, or after word that it does not come, or there is no room. The frame is not acknowledged.
     No,
 }
 
@@ -67,6 +80,7 @@ pub(super) struct Inbox {
     /// Of those, the ones whose record is not written yet.
     unsafe_numbers: BTreeSet<u64>,
     incoming: BTreeMap<u64, Incoming>,
+    order: Order,
     partials: BTreeMap<u64, Partial>,
     partial_bytes: usize,
     /// Commands that came after their lifespan.
@@ -76,6 +90,9 @@ pub(super) struct Inbox {
 impl Inbox {
     /// Takes an item in; `flight` is how long it was probably on its way.
     pub(super) fn take(&mut self, now: Monotonic, item: &CommandItem<'_>, flight: Duration) -> Took {
+        if self.order.is_void(item.number) {
+            return Took::No;
+        }
         if self.taken.contains(item.number) {
             return Took::Again(!self.unsafe_numbers.contains(&item.number));
         }
@@ -102,19 +119,24 @@ impl Inbox {
         }
         self.taken.insert(item.number);
         self.unsafe_numbers.insert(item.number);
-        let incoming =
-            Incoming { after: item.after, expires, body, safe: false, handed: false, recovered: false };
-        self.incoming.insert(item.number, incoming);
+        self.insert(item.number, Incoming::new(item.after, expires, body));
         Took::New
+    }
+
+    fn insert(&mut self, number: u64, incoming: Incoming) {
+        self.order.came(incoming.stream, number);
+        self.incoming.insert(number, incoming);
     }
 
     fn assemble(&mut self, item: &CommandItem<'_>, length: u32, at: u32) -> Result<Option<Bytes>, NoRoom> {
         let end = at.checked_add(item.bytes.len() as u32).filter(|end| *end <= length).ok_or(NoRoom)?;
         let known = self.partials.contains_key(&item.number);
-        let full = self.partial_bytes + item.bytes.len() > PARTIAL_BYTES_MAX;
+        // Pieces that are kept are acknowledged and do not come again, so none gives way. The oldest command may always be finished:
+        // that makes room for the others.
+        let oldest = known && self.partials.first_key_value().is_some_and(|(&first, _)| first == item.number);
+        let more = if oldest { 2 * COMMAND_BYTES_MAX } else { 0 };
+        let full = self.partial_bytes + item.bytes.len() > PARTIAL_BYTES_MAX + more;
         if length as usize > COMMAND_BYTES_MAX || full || (!known && self.partials.len() >= PARTIALS_MAX) {
-            // The oldest gives way, so that what nobody finishes does not stay for ever.
-            self.drop_partial_of_first();
             return Err(NoRoom);
         }
         let partial =
@@ -140,12 +162,6 @@ impl Inbox {
         Ok(Some(body.into()))
     }
 
-    fn drop_partial_of_first(&mut self) {
-        if let Some((&number, _)) = self.partials.first_key_value() {
-            self.drop_partial(number);
-        }
-    }
-
     fn drop_partial(&mut self, number: u64) {
         if let Some(partial) = self.partials.remove(&number) {
             self.partial_bytes -= partial.pieces.values().map(Bytes::len).sum::<usize>();
@@ -158,6 +174,7 @@ impl Inbox {
         if self.taken.pieces() >= PIECES_MAX && !self.taken.contains(start.saturating_sub(1)) {
             return false;
         }
+        self.order.void(start, end, &self.taken);
         self.taken.insert_range(start, end);
         let gone: Vec<_> = self.partials.range(start..end).map(|(&number, _)| number).collect();
         gone.into_iter().for_each(|number| self.drop_partial(number));
@@ -166,7 +183,7 @@ impl Inbox {
 
     /// The peer's journal is another one: its numbers begin anew.
     pub(super) fn begin_anew(&mut self) {
-        self.taken = Ranges::default();
+        (self.taken, self.order) = Default::default();
         self.partials.clear();
         self.partial_bytes = 0;
     }
@@ -182,34 +199,37 @@ impl Inbox {
     /// A command's record was not written: it counts as not come.
     pub(super) fn undo(&mut self, number: u64) {
         if self.unsafe_numbers.remove(&number) {
-            self.incoming.remove(&number);
+            self.finish(number);
             self.taken.remove(number);
         }
     }
 
-    /// Commands that may be handed over now, in order: safe, and not before the one that they follow.
+    /// The first command that may be handed over now: safe, and the next of its stream.
     pub(super) fn next_to_hand(&self, from: u64) -> Option<(u64, &Incoming)> {
-        let mut waiting =
-            self.incoming.range(from..).filter(|(_, incoming)| incoming.safe && !incoming.handed);
-        let found = waiting.find(|(_, incoming)| self.is_free(incoming.after));
-        found.map(|(&number, incoming)| (number, incoming))
+        let first = self.order.first().filter(|number| *number >= from);
+        let next = first.filter(|number| self.is_free(*number)).min()?;
+        Some((next, self.incoming.get(&next)?))
     }
 
-    /// Whether what follows this number may be handed over.
-    fn is_free(&self, after: u64) -> bool {
-        let held = self.incoming.get(&after).is_some_and(|before| !before.handed);
-        after == 0 || (self.taken.contains(after) && !held)
+    fn is_free(&self, number: u64) -> bool {
+        let incoming = self.incoming.get(&number).filter(|incoming| incoming.safe);
+        incoming.is_some_and(|i| self.order.is_free(i.stream, number, i.after, &self.taken))
     }
 
     pub(super) fn set_handed(&mut self, number: u64) {
         if let Some(incoming) = self.incoming.get_mut(&number) {
             incoming.handed = true;
+            self.order.handed(incoming.stream, number);
         }
     }
 
     /// The receiver is done with a command, or it is none for a receiver.
     pub(super) fn finish(&mut self, number: u64) -> bool {
-        self.incoming.remove(&number).is_some()
+        let gone = self.incoming.remove(&number);
+        if let Some(incoming) = &gone {
+            self.order.gone(incoming.stream, number);
+        }
+        gone.is_some()
     }
 
     pub(super) fn get(&self, number: u64) -> Option<&Incoming> {
@@ -237,11 +257,14 @@ impl Inbox {
     pub(super) fn encode_taken(&self) -> Vec<u8> {
         let mut out = Vec::new();
         self.taken.encode(&mut out);
+        self.order.encode(&mut out);
         out
     }
 
     pub(super) fn restore_taken(&mut self, value: &[u8]) -> Result<(), Malformed> {
-        self.taken = Ranges::decode(&mut Reader::new(value, "the record of numbers taken"))?;
+        let mut reader = Reader::new(value, "the record of numbers taken");
+        self.taken = Ranges::decode(&mut reader)?;
+        self.order.restore(&mut reader, &self.taken)?;
         Ok(())
     }
 
@@ -276,8 +299,7 @@ impl Inbox {
             }
         };
         let body = Bytes::copy_from_slice(reader.rest());
-        let incoming = Incoming { after, expires, body, safe: true, handed: false, recovered: true };
-        self.incoming.insert(number, incoming);
+        self.insert(number, Incoming { safe: true, recovered: true, ..Incoming::new(after, expires, body) });
         self.taken.insert(number);
         Ok(())
     }

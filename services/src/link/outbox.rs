@@ -42,6 +42,8 @@ pub(super) struct Left {
     pub(super) number: u64,
     pub(super) entry: Entry,
     pub(super) tries: u32,
+    /// Of its bytes, those that arrived.
+    pub(super) acknowledged: Ranges,
 }
 
 /// All commands on their way out.
@@ -249,10 +251,18 @@ impl Outbox {
         if void {
             self.voids.insert(number);
         }
-        Some(Left { number, entry, tries: flight.map_or(0, |flight| flight.copies) })
+        let (tries, acknowledged) =
+            flight.map_or_else(Default::default, |flight| (flight.copies, flight.acknowledged));
+        Some(Left { number, entry, tries, acknowledged })
     }
 
-    /// The peer has a new life, or is heard again: what is on the air goes again at once.
+    /// The peer has a new life: what it had of commands in pieces is gone.
+    pub(super) fn begin_anew(&mut self, now: Monotonic) {
+        self.flights.values_mut().for_each(|flight| flight.acknowledged = Ranges::default());
+        self.hurry(now);
+    }
+
+    /// The peer is heard again: what is on the air goes again at once.
     pub(super) fn hurry(&mut self, now: Monotonic) {
         self.timers.clear();
         for (&number, flight) in &mut self.flights {

@@ -49,6 +49,13 @@ pub struct Plan {
     pub resync: Duration,
 }
 
+impl Plan {
+    /// Bytes a second that go out: those that the flows get, and the overhead.
+    pub fn bytes_per_second(&self) -> f64 {
+        self.flows.iter().map(|flow| flow.granted).sum::<f64>() + self.overhead
+    }
+}
+
 /// Head, item and stamp of a command alone in its frame, and of a sample.
 const COMMAND_OVERHEAD: f64 = 20.0;
 const STATE_OVERHEAD: f64 = 15.0;

@@ -139,7 +139,7 @@ impl Link {
             drop(lost);
         }
         self.voids_on_air = Default::default();
-        self.outbox.hurry(now.monotonic);
+        self.outbox.begin_anew(now.monotonic);
         self.states.doubt_all();
         self.bulk_out.begin_anew();
         self.bulk_in.begin_anew();

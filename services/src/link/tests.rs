@@ -304,6 +304,43 @@ fn a_long_command_and_a_recording_arrive_in_pieces() {
 }
 
 #[test]
+fn a_long_command_survives_a_restart_of_its_receiver_between_its_pieces() {
+    static LONG: [u8; 2_000] = [4; 2_000];
+    let (mut a, mut b) = pair(1, &[]);
+    run(&mut a, &mut b, 10, 1_000, |_, _| true);
+    a.offer(1_000, 1, envelope(1, &LONG), Class::Command);
+    run(&mut a, &mut b, 1_000, 1_120, |_, _| true);
+    assert!(b.numbers().is_empty() && a.tickets.len() == 1, "some of its pieces are through");
+    let mut b = End::new(config(1, 400, 1, &[]), 2, b.journal.clone());
+    run(&mut a, &mut b, 1_120, 6_000, |_, _| true);
+    assert_eq!(b.numbers(), [1]);
+    assert!(matches!(a.tickets.last(), Some((_, TicketState::Delivered { .. }))));
+}
+
+#[test]
+fn late_word_of_a_piece_is_no_word_of_the_whole() {
+    static LONG: [u8; 600] = [5; 600];
+    let (mut a, mut b) = pair(1, &[]);
+    a.offer(10, 1, envelope(1, b"names are agreed"), Class::Command);
+    run(&mut a, &mut b, 10, 2_000, |_, _| true);
+    let mut short = envelope(2, &LONG);
+    short.stamp.lifespan_left_ms = Some(500);
+    a.offer(2_000, 2, short, Class::Command);
+    // Only the first piece arrives, and its acknowledgement waits on its way back.
+    let mut pieces = 0;
+    for at in (2_000..2_700).step_by(10) {
+        carry(&mut a, &mut b, at, &mut |_, _| {
+            pieces += 1;
+            pieces == 1
+        });
+    }
+    assert!(pieces > 2 && matches!(a.tickets.last(), Some((_, TicketState::Expired { tries: 1.. }))));
+    carry(&mut b, &mut a, 2_700, &mut |_, _| true);
+    assert!(matches!(a.tickets.last(), Some((_, TicketState::Expired { .. }))), "{:?}", a.tickets.last());
+    assert_eq!(b.numbers(), [1]);
+}
+
+#[test]
 fn a_cancelled_command_does_not_arrive_and_does_not_hold_others_up() {
     let (mut a, mut b) = pair(1, &[]);
     run(&mut a, &mut b, 10, 1_000, |_, _| true);

@@ -42,6 +42,7 @@ impl Node {
         let (outgoing, publish) = self.outgoing(place);
         let (sequence, skipped) = self.outbound.next(outgoing);
         let (node, boot) = (self.entity(), self.config.boot);
+        let before = passed.as_ref().and_then(|passed| Some((*passed.via.last()?, passed.before?)));
         let stamp = match passed {
             None => Stamp {
                 node,
@@ -54,7 +55,7 @@ impl Node {
                 via: Default::default(),
             },
             Some(passed) => {
-                let Passed { delivery, source_time, lifespan_left_ms, priority, via } = *passed;
+                let Passed { delivery, source_time, lifespan_left_ms, priority, via, .. } = *passed;
                 self.done_for_link(origin, delivery);
                 Stamp { node, boot, sequence, source_time, lifespan_left_ms, priority, skipped, via }
             }
@@ -72,22 +73,28 @@ impl Node {
         if let Some((number, within)) = confirm {
             let source = envelope.message.label.source();
             let deadline = now.monotonic + within;
-            let at_once = self.sharing.writers.confirm(source, number, &envelope, deadline);
+            let beyond = self.ask_beyond(now, origin, place, &envelope, deadline);
+            let at_once = self.sharing.writers.confirm((source, number), &envelope, &beyond, deadline);
             awaited = at_once.is_none().then(|| envelope.clone());
             self.tell_confirmed(now, at_once.into_iter().collect(), effects);
         }
-        let elsewhere = publish && !self.is_for_a_service_here(&envelope.message.label.address);
-        if !elsewhere {
-            return;
-        }
-        if self.bus_is_open {
-            self.publish(place, envelope, effects);
-            if let Some(sample) = awaited {
-                self.ask_for_confirmation(now, &sample, effects);
+        let came = match origin {
+            Origin::Link(link) => before.map(|before| (link, before, envelope.clone())),
+            _ => None,
+        };
+        if publish && !self.is_for_a_service_here(&envelope.message.label.address) {
+            if self.bus_is_open {
+                self.publish(place, envelope, effects);
+                if let Some(sample) = awaited {
+                    self.ask_for_confirmation(now, &sample, effects);
+                }
+            } else if qos.is_none() {
+                self.outbound.held_back(outgoing, skipped);
+                self.counters.held_back_offline += 1;
             }
-        } else if qos.is_none() {
-            self.outbound.held_back(outgoing, skipped);
-            self.counters.held_back_offline += 1;
+        }
+        if let Some((link, before, sample)) = came {
+            self.came_by_link(now, link, before, place, &sample, effects);
         }
     }
 

@@ -5,6 +5,7 @@
 
 mod answers;
 mod arrivals;
+mod confirming;
 mod keeping;
 mod services;
 mod tickets;
@@ -74,6 +75,8 @@ pub(super) struct Links {
     /// What the peers were last told of them.
     told: Vec<Source>,
     told_times: u64,
+    /// Who waits for readers beyond a link.
+    confirming: confirming::Confirming,
     /// Batches on their way to the journal, by the journal's number.
     writes: BTreeMap<u64, Vec<(usize, BatchId)>>,
 }
@@ -102,6 +105,7 @@ impl Links {
             services_changed: !specs.is_empty(),
             told: Vec::new(),
             told_times: 0,
+            confirming: Default::default(),
             writes: BTreeMap::new(),
         }
     }

@@ -23,6 +23,7 @@ fn said_at(source_time: Wall) -> Passed {
         priority: Priority::Data,
         via: Default::default(),
         delivery: None,
+        before: None,
     }
 }
 

@@ -1,7 +1,7 @@
 //! The node's part in DDS-shaped semantics: it speaks for its writers and its readers to other nodes.
 
 use super::{Node, Origin};
-use crate::dds::{Confirmed, Participant, Reading, Step, Topics, Writers};
+use crate::dds::{Confirmed, Participant, Reading, Step, Topics, Writers, name_of};
 use crate::event::Effect;
 use crate::service::{Input, Level};
 use aldis_envelope::aldis::{self, dds};
@@ -283,14 +283,32 @@ impl Node {
 
     /// A service waits until all have a sample: its readers are asked to say so at once.
     pub(super) fn ask_for_confirmation(&mut self, now: Now, sample: &Envelope, effects: &mut Vec<Effect>) {
-        for (reader, ends) in self.sharing.writers.awaited(sample) {
+        if let Some(stream) = name_of(sample) {
+            self.ask_readers(now, &stream, sample.stamp.sequence, effects);
+        }
+    }
+
+    /// The readers of a stream that are waited for are asked to confirm it up to a sequence at once.
+    pub(super) fn ask_readers(
+        &mut self,
+        now: Now,
+        stream: &dds::StreamName,
+        sequence: u64,
+        effects: &mut Vec<Effect>,
+    ) {
+        if !self.bus_is_open {
+            return;
+        }
+        for (reader, ends) in self.sharing.writers.awaited(stream, sequence) {
             self.tell(now, Space::State, Some(reader.node), dds::STREAMS, &ends, effects);
         }
     }
 
     pub(super) fn tell_confirmed(&mut self, now: Now, confirmed: Vec<Confirmed>, effects: &mut Vec<Effect>) {
         for Confirmed { source, number, outcome } in confirmed {
-            if let Some(place) = self.services.iter().position(|hosted| hosted.spec.source == source) {
+            if source == self.waits_for_links() {
+                self.confirmed_for_link(now, number, outcome.is_ok());
+            } else if let Some(place) = self.services.iter().position(|hosted| hosted.spec.source == source) {
                 self.run(now, place, Input::Confirmed(number, outcome), effects);
             }
         }

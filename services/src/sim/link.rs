@@ -15,5 +15,6 @@ pub use curves::{Chart, curves};
 pub use disk::Disk;
 pub use emulator::{Burst, Profile, Way};
 pub use hostile::{HostileReport, hostile};
+pub use rows::cost;
 pub use swarm::{SwarmReport, swarm, swarm_one, swarm_seed};
 pub use world::{LinkWorld, Machine, MachineId, Port, Seen, What};

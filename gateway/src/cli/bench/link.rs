@@ -92,11 +92,17 @@ impl LinkBench {
                 let seconds = (seconds * 10.0).round() / 10.0;
                 object.insert(
                     (*name).to_owned(),
-                    json!({ "goal": row.goal, "measured": row.measured, "met": row.met, "seconds": seconds }),
+                    json!({
+                        "goal": row.goal, "measured": row.measured, "met": row.met, "reason": row.reason,
+                        "seconds": seconds
+                    }),
                 );
             } else {
                 let met = if row.met { "met   " } else { "MISSED" };
                 print_line(format_args!("{name:4} {met} {}\n            goal: {}", row.measured, row.goal));
+                if let Some(reason) = &row.reason {
+                    print_line(format_args!("            why: {reason}"));
+                }
             }
         }
         if self.json {

@@ -7,10 +7,12 @@ use aldis_envelope::umaa::{HealthReport, Topic};
 use aldis_envelope::{ContentType, Label, Name, ServiceId, Source};
 use aldis_services::link::LinkSpec;
 use aldis_services::link::plan::{Flow, Plan as Planned, plan};
+use aldis_services::sim::link::cost;
 use aldis_services::track;
 use serde_json::json;
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::time::Duration;
 
 /// The bytes of a health report without a text.
 const HEALTH_BYTES: usize = 90;
@@ -24,6 +26,7 @@ const BUILT_IN: u32 = 3;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   aldis link plan configs/vehicle-400.toml
+  aldis link plan configs/link/shore.toml --check
   aldis link plan configs/shore.toml --flow UMAA::MM::X::XCommand:64:0.5 --flow UMAA::SA::Y::YReport:48:10:10")]
 pub(super) struct Plan {
     /// The configuration.
@@ -34,6 +37,15 @@ pub(super) struct Plan {
     /// A kind of message that comes from the other end, in the same form: it costs acknowledgements here.
     #[arg(long = "back")]
     back: Vec<Load>,
+    /// Runs the load over a simulated link with the figures of the first carrier, and tells how far the plan is from what it costs.
+    #[arg(long)]
+    check: bool,
+    /// With `--check`: virtual seconds of the run.
+    #[arg(long, default_value_t = 3_600, requires = "check", value_parser = clap::value_parser!(u64).range(60..=864_000))]
+    seconds: u64,
+    /// With `--check`: draws the losses.
+    #[arg(long, default_value_t = 1, requires = "check")]
+    seed: u64,
     /// One JSON object a link.
     #[arg(long)]
     json: bool,
@@ -129,11 +141,15 @@ pub(in crate::cli) fn starving(config: &Config) -> Vec<String> {
     plans.into_iter().flat_map(of).collect()
 }
 
+/// What crosses a link of the load, and of what comes back.
+fn flows(spec: &LinkSpec, config: &Config, loads: &[Load]) -> Vec<Flow> {
+    loads.iter().filter_map(|load| flow(spec, config, load)).collect()
+}
+
 fn planned(config: &Config, loads: &[Load], back: &[Load]) -> Vec<(LinkSpec, Planned)> {
     let one = |link: &crate::config::Link| {
         let spec = link.spec(config.entities.own());
-        let flows: Vec<_> = loads.iter().filter_map(|load| flow(&spec, config, load)).collect();
-        let back: Vec<_> = back.iter().filter_map(|load| flow(&spec, config, load)).collect();
+        let (flows, back) = (flows(&spec, config, loads), flows(&spec, config, back));
         let keyed = !link.keys.is_empty();
         let planned = spec.link.carriers.first().map(|carrier| plan(carrier, keyed, &flows, &back));
         planned.map(|planned| (spec, planned))
@@ -152,27 +168,65 @@ impl Plan {
         for (spec, planned) in &plans {
             let stays = loads.iter().filter(|load| flow(spec, &config, load).is_none());
             let stays: Vec<_> = stays.map(|load| load.descriptor.as_str()).collect();
-            if self.json { print_line(object(spec, planned, &stays)) } else { print(spec, planned, &stays) }
+            let checked = if self.check { self.measure(spec, &config, &loads, planned) } else { None };
+            if self.json {
+                print_line(object(spec, planned, &stays, checked));
+            } else {
+                print(spec, planned, &stays, checked);
+            }
         }
         Ok(())
     }
+
+    /// What the load costs in a run. None for a link without a carrier.
+    fn measure(
+        &self,
+        spec: &LinkSpec,
+        config: &Config,
+        loads: &[Load],
+        planned: &Planned,
+    ) -> Option<Checked> {
+        let (there, back) = (flows(spec, config, loads), flows(spec, config, &self.back));
+        let (carrier, keyed) = (spec.link.carriers.first()?, !spec.link.keys.is_empty());
+        let measured = cost(carrier, keyed, (&there, &back), Duration::from_secs(self.seconds), self.seed);
+        Some(Checked { planned: planned.bytes_per_second(), measured })
+    }
 }
 
-fn object(spec: &LinkSpec, planned: &Planned, stays: &[&str]) -> serde_json::Value {
+/// Bytes a second by the plan and in a run.
+#[derive(Debug, Clone, Copy)]
+struct Checked {
+    planned: f64,
+    measured: f64,
+}
+
+impl Checked {
+    fn off_percent(self) -> f64 {
+        100.0 * (self.planned - self.measured) / self.measured.max(1e-9)
+    }
+}
+
+fn object(spec: &LinkSpec, planned: &Planned, stays: &[&str], checked: Option<Checked>) -> serde_json::Value {
     let flows = planned.flows.iter().map(|flow| {
         json!({
             "descriptor": flow.descriptor, "class": format!("{:?}", flow.class).to_lowercase(),
             "wanted_bytes_per_s": flow.wanted, "granted_bytes_per_s": flow.granted, "starves": flow.starves,
         })
     });
+    let checked = checked.map(|checked| {
+        json!({
+            "planned_bytes_per_s": checked.planned, "measured_bytes_per_s": checked.measured,
+            "off_percent": checked.off_percent(), "within_10_percent": checked.off_percent().abs() <= 10.0,
+        })
+    });
     json!({
-        "link": spec.name, "rate_bytes_per_s": planned.rate, "overhead_bytes_per_s": planned.overhead,
+        "check": checked, "link": spec.name, "rate_bytes_per_s": planned.rate, "overhead_bytes_per_s": planned.overhead,
         "flows": flows.collect::<Vec<_>>(), "stays": stays,
         "worst_command_s": planned.worst_command.as_secs_f64(), "resync_s": planned.resync.as_secs_f64(),
     })
 }
 
-fn print(spec: &LinkSpec, planned: &Planned, stays: &[&str]) {
+fn print(spec: &LinkSpec, planned: &Planned, stays: &[&str], checked: Option<Checked>) {
     print_line(format_args!("{}: {:.0} bytes a second", spec.name, planned.rate));
     for flow in &planned.flows {
         let starves = if flow.starves { "  STARVES" } else { "" };
@@ -191,6 +245,14 @@ fn print(spec: &LinkSpec, planned: &Planned, stays: &[&str]) {
         planned.worst_command.as_secs_f64(),
         planned.resync.as_secs_f64()
     ));
+    if let Some(checked) = checked {
+        print_line(format_args!(
+            "  planned {:.1} bytes a second, a run took {:.1}: {:+.1} %",
+            checked.planned,
+            checked.measured,
+            checked.off_percent()
+        ));
+    }
 }
 
 #[cfg(test)]

@@ -27,13 +27,123 @@ fn take(inbox: &mut Inbox, item: &CommandItem<'_>) {
 #[test]
 fn a_stream_keeps_its_order_and_others_do_not_wait_for_it() {
     let mut inbox = Inbox::default();
-    take(&mut inbox, &item(3, 1, b"3"));
-    take(&mut inbox, &item(5, 3, b"5"));
-    take(&mut inbox, &item(4, 2, b"4"));
-    take(&mut inbox, &item(2, 0, b"2"));
+    take(&mut inbox, &of_stream(1, 3, 1));
+    take(&mut inbox, &of_stream(1, 5, 3));
+    take(&mut inbox, &of_stream(2, 4, 2));
+    take(&mut inbox, &of_stream(2, 2, 0));
     assert_eq!(handed(&mut inbox), [2, 4]);
     assert!(inbox.void(1, 1));
     assert_eq!(handed(&mut inbox), [3, 5]);
+}
+
+/// The content of a command begins with its stream.
+fn of_stream(stream: u8, number: u64, after: u64) -> CommandItem<'static> {
+    const STREAMS: &[u8] = &[0, 1, 2, 3];
+    let stream = usize::from(stream);
+    item(number, after, &STREAMS[stream..=stream])
+}
+
+#[test]
+fn over_one_that_is_not_coming_a_stream_waits_for_all_that_may_be_its_own() {
+    let mut inbox = Inbox::default();
+    take(&mut inbox, &of_stream(1, 1, 0));
+    assert_eq!(handed(&mut inbox), [1]);
+    // 2 to 4 are of the stream; 2 and 4 are still on the air when 3 and 5 are told not to come.
+    take(&mut inbox, &of_stream(1, 6, 5));
+    take(&mut inbox, &of_stream(1, 7, 6));
+    assert!(inbox.void(3, 1) && inbox.void(5, 1));
+    assert!(handed(&mut inbox).is_empty());
+    take(&mut inbox, &of_stream(1, 4, 3));
+    assert!(handed(&mut inbox).is_empty(), "2 may be of the stream");
+    // What comes may be of another stream: then it is waited for no longer.
+    take(&mut inbox, &of_stream(2, 2, 0));
+    assert_eq!(handed(&mut inbox), [2, 4, 6, 7]);
+}
+
+#[test]
+fn one_that_waits_holds_its_stream_after_several_are_not_coming() {
+    let mut inbox = Inbox::default();
+    take(&mut inbox, &of_stream(1, 2, 1));
+    take(&mut inbox, &of_stream(1, 5, 4));
+    take(&mut inbox, &of_stream(2, 6, 0));
+    assert!(inbox.void(3, 2));
+    assert_eq!(handed(&mut inbox), [6], "1 may come, and 2 waits for it");
+    assert!(inbox.void(1, 1));
+    assert_eq!(handed(&mut inbox), [2, 5]);
+}
+
+#[test]
+fn who_begins_a_stream_anew_does_not_overtake_what_waits_of_it() {
+    let mut inbox = Inbox::default();
+    take(&mut inbox, &of_stream(1, 2, 1));
+    // The sender has forgotten what is through, and was started anew.
+    take(&mut inbox, &of_stream(1, 9, 0));
+    assert!(handed(&mut inbox).is_empty());
+    assert!(inbox.void(1, 1));
+    assert_eq!(handed(&mut inbox), [2, 9]);
+}
+
+#[test]
+fn what_comes_after_word_that_it_does_not_is_not_taken_for_delivered() {
+    let mut inbox = Inbox::default();
+    take(&mut inbox, &of_stream(1, 1, 0));
+    assert!(inbox.void(1, 2));
+    assert_eq!(inbox.take(at(0), &of_stream(1, 1, 0), Duration::ZERO), Took::Again(true));
+    assert_eq!(inbox.take(at(0), &of_stream(1, 2, 1), Duration::ZERO), Took::No);
+    // Very old word is forgotten, and never more than is true is known.
+    for number in (4..400).step_by(2) {
+        take(&mut inbox, &of_stream(1, number, 0));
+        assert!(inbox.void(number + 1, 1));
+    }
+    assert_eq!(inbox.take(at(0), &of_stream(1, 399, 0), Duration::ZERO), Took::No);
+    for number in (4..400).step_by(2) {
+        assert_eq!(inbox.take(at(0), &of_stream(1, number, 0), Duration::ZERO), Took::Again(true));
+    }
+}
+
+#[test]
+fn a_restart_remembers_what_is_not_coming() {
+    let mut inbox = Inbox::default();
+    take(&mut inbox, &of_stream(1, 2, 1));
+    assert!(inbox.void(3, 1));
+    take(&mut inbox, &of_stream(2, 5, 0));
+    let mut restored = Inbox::default();
+    restored.restore_taken(&inbox.encode_taken()).unwrap();
+    let now = Now { monotonic: at(0), wall: Wall(0) };
+    restored.restore(2, &inbox.encode(2, now).unwrap(), now).unwrap();
+    take(&mut restored, &of_stream(1, 4, 3));
+    take(&mut restored, &of_stream(2, 6, 5));
+    assert_eq!(handed(&mut restored), [6], "5 came, so what follows it does not wait for 1");
+    assert!(restored.void(1, 1));
+    assert_eq!(handed(&mut restored), [2, 4]);
+    // A journal from before this was kept does not tell.
+    let mut old = Vec::new();
+    inbox.taken.encode(&mut old);
+    let mut restored = Inbox::default();
+    restored.restore_taken(&old).unwrap();
+    take(&mut restored, &of_stream(2, 6, 5));
+    assert!(handed(&mut restored).is_empty());
+    assert!(restored.void(0, 6));
+    assert_eq!(handed(&mut restored), [6]);
+}
+
+#[test]
+fn the_oldest_unfinished_command_has_room_when_there_is_none() {
+    let mut inbox = Inbox::default();
+    let half = vec![0; COMMAND_BYTES_MAX / 2];
+    let length = COMMAND_BYTES_MAX as u32;
+    let piece = |number, at| CommandItem { piece: Some((length, at)), ..item(number, 0, &half) };
+    let many = (PARTIAL_BYTES_MAX / half.len()) as u64;
+    for number in 1..=many {
+        assert_eq!(inbox.take(at(0), &piece(number, 0), Duration::ZERO), Took::Piece);
+    }
+    for number in [many + 1, 2] {
+        assert_eq!(inbox.take(at(0), &piece(number, length / 2), Duration::ZERO), Took::No);
+    }
+    // What was acknowledged is still there.
+    for number in 1..=many {
+        assert_eq!(inbox.take(at(0), &piece(number, length / 2), Duration::ZERO), Took::New);
+    }
 }
 
 #[test]
@@ -62,8 +172,8 @@ fn what_comes_after_its_lifespan_is_not_taken() {
 #[test]
 fn a_received_command_survives_a_restart_and_is_handed_over_again() {
     let mut inbox = Inbox::default();
-    take(&mut inbox, &item(1, 0, b"one"));
-    take(&mut inbox, &CommandItem { lifespan: Some(100), ..item(2, 1, b"two") });
+    take(&mut inbox, &of_stream(1, 1, 0));
+    take(&mut inbox, &CommandItem { lifespan: Some(100), ..of_stream(1, 2, 1) });
     let now = Now { monotonic: at(0), wall: Wall(0) };
     let mut restored = Inbox::default();
     restored.restore_taken(&inbox.encode_taken()).unwrap();
@@ -72,7 +182,7 @@ fn a_received_command_survives_a_restart_and_is_handed_over_again() {
     }
     assert_eq!(handed(&mut restored), [1, 2]);
     assert!(restored.get(2).unwrap().recovered);
-    assert_eq!(restored.take(at(0), &item(2, 1, b"two"), Duration::ZERO), Took::Again(true));
+    assert_eq!(restored.take(at(0), &of_stream(1, 2, 1), Duration::ZERO), Took::Again(true));
 }
 
 proptest! {

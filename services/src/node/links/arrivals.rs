@@ -24,6 +24,11 @@ impl Node {
         if label.attributes.content_type == ContentType::Aldis && label.descriptor() == told::SERVICES {
             self.services_told(now, place, &envelope, effects);
             self.done_for_link(origin, id);
+        } else if label.attributes.content_type == ContentType::Aldis
+            && matches!(label.descriptor(), told::CONFIRM_ASK | told::CONFIRMED)
+        {
+            self.told_of_confirmation(now, place, &envelope, effects);
+            self.done_for_link(origin, id);
         } else if !attached.spec.export.behind.contains(&source.entity) {
             let text = format!(
                 "{}: a message of {source} is refused: {} is not among the entities behind this link",
@@ -66,6 +71,7 @@ impl Node {
         via.push(stamp.node);
         let passed = Passed {
             delivery,
+            before: Some((stamp.boot, stamp.sequence)),
             source_time: stamp.source_time,
             lifespan_left_ms: stamp.lifespan_left_ms,
             priority: stamp.priority,

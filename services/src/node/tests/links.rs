@@ -223,3 +223,39 @@ fn what_is_accepted_survives_both_ends() {
     let got = of(&seen, "eid1sid100 UMAA::SO::X::XCommand ");
     assert_eq!(got, ["b\"1\"", "b\"2\"", "b\"3\"", "b\"4\"", "b\"5\""]);
 }
+
+#[test]
+fn who_waits_for_all_readers_waits_for_those_beyond_a_link() {
+    let (waiting, told) = super::sharing::writer(source(1, 100), "UMAA::SO::T::TReport", &["go"]);
+    let (mut world, shore, _) = pair(vec![waiting], Vec::new());
+    let (reader, seen) = probe(source(5, 100), &["UMAA::SO::T"], idle());
+    world.add(config(&[5], vec![reader])).unwrap();
+    world.partition(&[0, 1, 1], Duration::ZERO);
+    world.run_for(Duration::from_secs(10));
+    let confirmed = || of(&told, "confirmed ");
+    let has =
+        |number: &str| of(&seen, "eid1sid100 UMAA::SO::T::TReport b").contains(&format!("\"{number}\""));
+    say(&mut world, shore, "?7");
+    // Nobody reads on this side, and the word is on its way: half a round trip there, and half of one back.
+    world.run_for(Duration::from_millis(400));
+    assert!(confirmed().is_empty(), "{:?}", confirmed());
+    world.run_for(Duration::from_millis(4_500));
+    assert_eq!((confirmed(), has("7")), (vec!["7 Ok(())".to_owned()], true));
+    // The reader loses its gateway: the sample crosses, and it is not confirmed.
+    world.partition(&[0, 1, 2], Duration::ZERO);
+    say(&mut world, shore, "?8");
+    world.run_for(Duration::from_secs(6));
+    let missing = "8 Err(Missing { missing: [400] })".to_owned();
+    assert_eq!((confirmed()[1..].to_vec(), has("8")), (vec![missing], false));
+    // Whoever reads here is waited for as well as who reads there.
+    world.partition(&[0, 1, 1], Duration::ZERO);
+    world.run_for(Duration::from_secs(15));
+    assert!(has("8"));
+    let (near, _) = probe(source(6, 100), &["UMAA::SO::T"], idle());
+    world.add(config(&[6], vec![near])).unwrap();
+    world.partition(&[0, 1, 1, 0], Duration::ZERO);
+    world.run_for(Duration::from_secs(5));
+    say(&mut world, shore, "?9");
+    world.run_for(Duration::from_secs(6));
+    assert_eq!((confirmed()[2..].to_vec(), has("9")), (vec!["9 Ok(())".to_owned()], true));
+}

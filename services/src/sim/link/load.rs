@@ -4,7 +4,6 @@ use aldis_envelope::{
     Address, BootId, ContentType, EntityId, Envelope, Instance, Label, Message, Name, Priority, ServiceId,
     Source, Stamp, Wall,
 };
-use bytes::Bytes;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -36,13 +35,24 @@ fn stamp(node: u64, sequence: u64, at: Duration, lifespan: Option<Duration>) -> 
 
 /// A command of 64 bytes from a node to a service of an entity, the `number`th of its stream.
 pub(super) fn command(from: u64, to: u64, number: u64, at: Duration, lifespan: Duration) -> Envelope {
-    let mut content = [0x5a; 64];
+    command_of(64, (from, to), number, at, lifespan)
+}
+
+/// The same with so many bytes, at least 16, from one node to another.
+pub(super) fn command_of(
+    bytes: usize,
+    (from, to): (u64, u64),
+    number: u64,
+    at: Duration,
+    lifespan: Duration,
+) -> Envelope {
+    let mut content = vec![0x5a; bytes.max(16)];
     content[..8].copy_from_slice(&from.to_be_bytes());
     content[8..16].copy_from_slice(&number.to_be_bytes());
     let address = Address::Service(Source::new(entity(to), ServiceId::HEALTH));
     let content_type = ContentType::Umaa;
     let label = Label::limitedcast(address, content_type, name("UMAA::Bench::Command").into(), source(from));
-    let message = Message::new(Arc::new(label), Bytes::copy_from_slice(&content));
+    let message = Message::new(Arc::new(label), content.into());
     Envelope { message, stamp: stamp(from, number, at, Some(lifespan)) }
 }
 
@@ -52,10 +62,10 @@ pub(super) fn command_number(content: &[u8]) -> (u64, u64) {
     (number(&content[..8]), number(&content[8..16]))
 }
 
-/// A sample of an instance.
+/// A sample of an instance, with at least 8 bytes.
 pub(super) fn state(node: u64, instance: i64, sequence: u64, at: Duration, bytes: usize) -> Envelope {
     let label = Label::broadcast(ContentType::Umaa, name("UMAA::Bench::State"), source(node));
-    let mut content = vec![0xa5; bytes];
+    let mut content = vec![0xa5; bytes.max(8)];
     content[..8].copy_from_slice(&sequence.to_be_bytes());
     let message = Message::new(Arc::new(label), content.into()).of_instance(Instance::of_number(instance));
     Envelope { message, stamp: stamp(node, sequence, at, None) }

@@ -6,9 +6,10 @@ mod lower;
 mod pace;
 
 pub(super) use commands::{after_outage, exactly_once, latency, refused, through_shore};
+pub use forecast::cost;
 pub(super) use forecast::{Forecast, forecasts};
 pub(super) use lower::{bulk, overload, resync};
-pub(super) use pace::{budget, idle, queueing};
+pub(super) use pace::{Idle, budget, idle, queueing};
 
 use super::emulator::Profile;
 use super::world::{LinkWorld, Port};
@@ -73,6 +74,11 @@ impl Pair {
         }
         self.world.run_for(Duration::from_secs(20));
         self.world.take_seen();
+    }
+
+    pub(super) fn frames(&self) -> u64 {
+        let frames = |port| self.world.link(port).counters().frames_sent;
+        frames(self.shore) + frames(self.vehicle)
     }
 
     pub(super) fn bytes(&self) -> u64 {

@@ -1,7 +1,7 @@
 //! Many links drawn from seeds, each with its own mixture of troubles, and what must hold on all of them.
 
 use super::emulator::{Burst, Profile};
-use super::load::{bulk, command, command_number, state};
+use super::load::{bulk, command_number, command_of, state};
 use super::world::{LinkWorld, MachineId, Port, Seen, What};
 use crate::link::{Class, LinkKey, Ticket, TicketState};
 use aldis_envelope::Monotonic;
@@ -43,10 +43,15 @@ struct Options {
     gap: Duration,
     states: i64,
     bulk: usize,
+    /// The length of a command.
+    bytes: usize,
 }
 
 impl Options {
     fn draw(random: &mut fastrand::Rng) -> Self {
+        // Of its own: what is drawn here moves nothing else.
+        let mut sizes = random.clone();
+        let bytes = if sizes.u8(0..4) == 0 { sizes.usize(100..3_000) } else { 64 };
         let burst =
             (random.u8(0..3) == 0).then(|| Burst { mean: Duration::from_millis(random.u64(100..4_000)) });
         let rate = [300, 1_200, 5_000, 125_000][random.usize(0..4)];
@@ -72,9 +77,10 @@ impl Options {
             lifespan: Duration::from_secs(random.u64(5..900)),
             // A third of the rate at most for commands, so that the link can carry them.
             gap: Duration::from_millis(random.u64(300..8_000))
-                .max(Duration::from_secs_f64(400.0 / rate as f64)),
+                .max(Duration::from_secs_f64((bytes + 336) as f64 / rate as f64)),
             states: random.i64(0..30),
             bulk: if random.bool() { random.usize(100..20_000) } else { 0 },
+            bytes,
             profile,
         }
     }
@@ -194,7 +200,8 @@ impl Run {
             number += 1;
             let at = self.world.now();
             for (from, to, end) in [(1, 400, 0), (400, 1, 1)] {
-                let envelope = command(from, to, number, at.elapsed(), self.options.lifespan);
+                let envelope =
+                    command_of(self.options.bytes, (from, to), number, at.elapsed(), self.options.lifespan);
                 let ticket = self.world.offer(self.ports[end], envelope, Class::Command);
                 self.tickets.insert(ticket, (from, number));
                 let known = Known { offered: at, orphaned: false, last_word: None };

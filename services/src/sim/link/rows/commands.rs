@@ -57,6 +57,7 @@ pub(in crate::sim::link) struct Latency {
     pub(in crate::sim::link) seconds: Vec<f64>,
     pub(in crate::sim::link) copies: f64,
     pub(in crate::sim::link) bytes: f64,
+    pub(in crate::sim::link) frames: f64,
 }
 
 /// G2 and G9: commands at random moments, 0.5 a second on average; with `backlog`, states and bulk at ten times the rate wait too.
@@ -68,7 +69,8 @@ pub(in crate::sim::link) fn latency(
 ) -> Latency {
     let mut pair = setting.warm_pair();
     let mut random = fastrand::Rng::with_seed(setting.seed ^ 0x6c61_7465);
-    let (bytes, copies) = (pair.bytes(), pair.world.link(pair.shore).counters().command_copies);
+    let (bytes, frames) = (pair.bytes(), pair.frames());
+    let copies = pair.world.link(pair.shore).counters().command_copies;
     let (mut starts, mut latency) = (BTreeMap::new(), Latency::default());
     let mut sequence = 0;
     for number in 1..=count {
@@ -87,6 +89,7 @@ pub(in crate::sim::link) fn latency(
     pair.world.run_for(Duration::from_secs(30));
     collect(&mut pair, &starts, &mut latency);
     latency.bytes = (pair.bytes() - bytes) as f64 / count as f64;
+    latency.frames = (pair.frames() - frames) as f64 / count as f64;
     let counters = pair.world.link(pair.shore).counters();
     latency.copies = (counters.command_copies - copies) as f64 / count as f64;
     latency

@@ -1,9 +1,10 @@
 //! What the dry run of the budget says of a load, against what the load then costs.
 
-use super::{SHORE, Setting, VEHICLE};
+use super::{Pair, SHORE, Setting, VEHICLE};
 use crate::link::plan::{Flow, plan};
 use crate::link::{CarrierConfig, CarrierId, Class};
-use crate::sim::link::load::{bulk, command, state};
+use crate::sim::link::emulator::Profile;
+use crate::sim::link::load::{bulk, command_of, state};
 use aldis_envelope::Monotonic;
 use std::time::Duration;
 
@@ -66,47 +67,90 @@ fn forecast(setting: &Setting, load: &Load, lasts: Duration) -> Forecast {
         round_trip: profile.round_trip(),
         loss: profile.loss,
     };
-    let planned = plan(&carrier, setting.keyed, &load.there, &load.back);
-    let planned = planned.flows.iter().map(|flow| flow.granted).sum::<f64>() + planned.overhead;
+    let planned = plan(&carrier, setting.keyed, &load.there, &load.back).bytes_per_second();
+    Forecast { load: load.name, planned, measured: cost_of(setting, &load.there, &load.back, lasts) }
+}
+
+/// What flows cost in a run on a simulated carrier: bytes a second that this end sends. `back` comes from the other end. Loss is
+/// independent, from the seed; the names are agreed beforehand.
+pub fn cost(
+    carrier: &CarrierConfig,
+    keyed: bool,
+    (there, back): (&[Flow], &[Flow]),
+    lasts: Duration,
+    seed: u64,
+) -> f64 {
+    let profile = Profile {
+        name: "configured",
+        rate: carrier.rate,
+        delay: carrier.round_trip / 2,
+        loss: carrier.loss.clamp(0.0, 0.9),
+        mtu: carrier.mtu,
+        queue: Profile::L1.queue.max(carrier.mtu * 16),
+        ..Profile::L1
+    };
+    cost_of(&Setting { profile, keyed, seed }, there, back, lasts)
+}
+
+/// A flow in the run.
+struct Source<'a> {
+    flow: &'a Flow,
+    there: bool,
+    /// Its instances begin here: no two flows share one.
+    first: i64,
+    number: u64,
+    due: Monotonic,
+}
+
+fn cost_of(setting: &Setting, there: &[Flow], back: &[Flow], lasts: Duration) -> f64 {
     let mut pair = setting.warm_pair();
     let mut random = fastrand::Rng::with_seed(setting.seed ^ 0x666f_7265);
     let start = pair.world.now();
-    // Every flow begins at a moment of its own.
-    let phase =
-        |random: &mut fastrand::Rng, flow: &Flow| Duration::from_secs_f64(random.f64() / flow.per_second);
-    let flows = load.there.iter().map(|flow| (true, flow)).chain(load.back.iter().map(|flow| (false, flow)));
-    let mut due: Vec<(Monotonic, u64, bool, &Flow)> =
-        flows.map(|(there, flow)| (start + phase(&mut random, flow), 0, there, flow)).collect();
+    let flows = there.iter().map(|flow| (true, flow)).chain(back.iter().map(|flow| (false, flow)));
+    let mut first = 0;
+    let mut sources: Vec<Source<'_>> = Vec::new();
+    for (there, flow) in flows.filter(|(_, flow)| flow.per_second > 1e-9) {
+        // Every flow begins at a moment of its own.
+        let due = start + Duration::from_secs_f64(random.f64() / flow.per_second);
+        sources.push(Source { flow, there, first, number: 0, due });
+        first += i64::from(flow.instances);
+    }
     let before = pair.world.bytes(pair.vehicle);
     while pair.world.now() - start < lasts {
         let now = pair.world.now();
-        for (at, number, there, flow) in due.iter_mut().filter(|(at, ..)| *at <= now) {
-            *number += 1;
-            *at = *at + Duration::from_secs_f64(1.0 / flow.per_second);
-            let (from, to) = if *there { (VEHICLE, SHORE) } else { (SHORE, VEHICLE) };
-            let (port, at) = (if *there { pair.vehicle } else { pair.shore }, now.elapsed());
-            let envelope = match flow.class {
-                Class::Command => command(from, to, *number, at, Duration::from_secs(60)),
-                Class::State => {
-                    let instance = (*number % u64::from(flow.instances)) as i64;
-                    state(from, instance, *number, at, flow.bytes)
-                }
-                Class::Bulk => bulk(from, *number, at, flow.bytes),
-            };
-            pair.world.offer(port, envelope, flow.class);
+        for source in sources.iter_mut().filter(|source| source.due <= now) {
+            source.offer(&mut pair);
         }
-        let next = due.iter().map(|(at, ..)| *at).min();
+        let next = sources.iter().map(|source| source.due).min();
         pair.world.run_until(next.unwrap_or(start + lasts).min(start + lasts));
         pair.world.take_seen();
     }
     let sent = pair.world.bytes(pair.vehicle) - before;
-    Forecast { load: load.name, planned, measured: sent as f64 / lasts.as_secs_f64() }
+    sent as f64 / lasts.as_secs_f64()
+}
+
+impl Source<'_> {
+    fn offer(&mut self, pair: &mut Pair) {
+        let Flow { class, bytes, per_second, instances, .. } = *self.flow;
+        self.number += 1;
+        self.due = self.due + Duration::from_secs_f64(1.0 / per_second);
+        let (from, to) = if self.there { (VEHICLE, SHORE) } else { (SHORE, VEHICLE) };
+        let (port, at) = (if self.there { pair.vehicle } else { pair.shore }, pair.world.now().elapsed());
+        let envelope = match class {
+            Class::Command => command_of(bytes, (from, to), self.number, at, Duration::from_secs(60)),
+            Class::State => {
+                let instance = self.first + (self.number % u64::from(instances.max(1))) as i64;
+                state(from, instance, self.number, at, bytes)
+            }
+            Class::Bulk => bulk(from, self.number, at, bytes),
+        };
+        pair.world.offer(port, envelope, class);
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::link::Profile;
 
     #[test]
     fn the_plan_says_the_bytes_of_a_run_within_a_tenth() {

@@ -12,6 +12,10 @@ use std::time::Duration;
 #[derive(Debug, Clone, Copy)]
 pub(in crate::sim::link) struct Resync {
     pub(in crate::sim::link) seconds: f64,
+    /// Seconds until the sender has heard the peer again.
+    pub(in crate::sim::link) heard: f64,
+    /// Bytes forward until the last sample arrived.
+    pub(in crate::sim::link) until_last: f64,
     pub(in crate::sim::link) forward: f64,
     pub(in crate::sim::link) both: f64,
 }
@@ -52,7 +56,7 @@ pub(in crate::sim::link) fn resync(setting: &Setting, changed: f64) -> Resync {
     pair.world.take_seen();
     let (there, back) = (pair.world.bytes(pair.vehicle), pair.world.bytes(pair.shore));
     let start = pair.world.now();
-    let mut last = start;
+    let (mut last, mut heard, mut until_last) = (start, None, 0);
     let mut settled = start;
     let mut bytes = (0, 0);
     while pair.world.now() - start < Duration::from_secs(120) {
@@ -60,8 +64,11 @@ pub(in crate::sim::link) fn resync(setting: &Setting, changed: f64) -> Resync {
         for seen in pair.world.take_seen() {
             if seen.port == pair.shore && matches!(&seen.what, What::Delivered(d) if d.class == Class::State)
             {
-                last = seen.at;
+                (last, until_last) = (seen.at, pair.world.bytes(pair.vehicle) - there);
             }
+        }
+        if pair.world.link(pair.vehicle).is_heard() {
+            heard.get_or_insert(pair.world.now() - start);
         }
         if pair.world.link(pair.vehicle).is_settled() && pair.world.link(pair.shore).is_heard() {
             settled = pair.world.now();
@@ -70,7 +77,13 @@ pub(in crate::sim::link) fn resync(setting: &Setting, changed: f64) -> Resync {
         }
     }
     let seconds = if changed > 0.0 { last - start } else { settled - start };
-    Resync { seconds: seconds.as_secs_f64(), forward: bytes.0 as f64, both: (bytes.0 + bytes.1) as f64 }
+    Resync {
+        seconds: seconds.as_secs_f64(),
+        heard: heard.unwrap_or_default().as_secs_f64(),
+        until_last: until_last as f64,
+        forward: bytes.0 as f64,
+        both: (bytes.0 + bytes.1) as f64,
+    }
 }
 
 /// G6: mean and p99 age in seconds of what the receiver holds of ten instances of 48 bytes, offered at ten times the rate.

@@ -79,6 +79,7 @@ pub(in crate::sim::link) fn budget(setting: &Setting, seconds: u64) -> (i64, f64
 #[derive(Debug, Clone, Copy)]
 pub(in crate::sim::link) struct Idle {
     pub(in crate::sim::link) bytes_per_second: f64,
+    pub(in crate::sim::link) frames_per_second: f64,
     pub(in crate::sim::link) false_alarms_per_hour: f64,
     /// Seconds until a cut is told, the most.
     pub(in crate::sim::link) detection: f64,
@@ -88,7 +89,7 @@ pub(in crate::sim::link) struct Idle {
 /// G11: hours in which nobody has anything to say, then a cut, then silent mode.
 pub(in crate::sim::link) fn idle(setting: &Setting, hours: u64) -> Idle {
     let mut pair = setting.warm_pair();
-    let bytes = pair.bytes();
+    let (bytes, frames) = (pair.bytes(), pair.frames());
     let (mut alarms, mut heard) = (0, true);
     let step = Duration::from_millis(200);
     let start = pair.world.now();
@@ -99,6 +100,7 @@ pub(in crate::sim::link) fn idle(setting: &Setting, hours: u64) -> Idle {
         heard = now_heard;
     }
     let bytes_per_second = (pair.bytes() - bytes) as f64 / (3_600 * hours) as f64;
+    let frames_per_second = (pair.frames() - frames) as f64 / (3_600 * hours) as f64;
     pair.world.cut_all(pair.shore, true);
     let cut: Monotonic = pair.world.now();
     while pair.world.link(pair.shore).is_heard() && pair.world.now() - cut < GONE_AFTER * 3 {
@@ -112,5 +114,6 @@ pub(in crate::sim::link) fn idle(setting: &Setting, hours: u64) -> Idle {
     let before = pair.bytes();
     pair.world.run_for(Duration::from_secs(3_600));
     let silent_bytes = pair.bytes() - before;
-    Idle { bytes_per_second, false_alarms_per_hour: alarms as f64 / hours as f64, detection, silent_bytes }
+    let false_alarms_per_hour = alarms as f64 / hours as f64;
+    Idle { bytes_per_second, frames_per_second, false_alarms_per_hour, detection, silent_bytes }
 }
