@@ -150,7 +150,7 @@ impl Node {
             lifespan_left_ms: Some(u32::try_from(lasts.as_millis()).unwrap_or(u32::MAX)),
             priority: Priority::Data,
             skipped: 0,
-            via: Vec::new(),
+            via: Default::default(),
         };
         let offer = Offer {
             ticket: Ticket::default(),

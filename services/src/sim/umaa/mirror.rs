@@ -212,7 +212,7 @@ mod tests {
             lifespan_left_ms: None,
             priority: Priority::Data,
             skipped: 0,
-            via: Vec::new(),
+            via: Default::default(),
         };
         Envelope { message: message.of_instance(Instance::of_number(1)), stamp }
     }

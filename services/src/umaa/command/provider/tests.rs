@@ -451,7 +451,7 @@ fn the_last_word_of_a_former_life_counts_whatever_its_clock_said() {
         lifespan_left_ms: None,
         priority: Priority::Data,
         skipped: 0,
-        via: Vec::new(),
+        via: Default::default(),
     };
     let said = |sequence, seconds, state, reason| {
         let time = DateTime::new(seconds, 0).unwrap();
