@@ -128,10 +128,7 @@ fn each_route_is_answered_and_boats_are_left_to_others() {
     assert!(why(&routes(&mut osm, CAR, 4, &[[(60.0, 20.0), (60.0, 20.01)]])[0]).contains("Region Id[4]"));
     assert!(routes(&mut osm, BOAT, 0, &[[(60.0, 20.0), (60.0, 20.01)]]).is_empty());
     // What changes is seen by the next request.
-    let mut elsewhere = KeepOutZone::default();
-    elsewhere.zone_id = 5;
-    elsewhere.boundary =
-        Ref::new(Circle { center_point: at(60.05, 20.05), radius: 100.0, ..Circle::default() });
+    let elsewhere = zone(60.05, 20.05);
     hear(&mut osm, &elsewhere);
     let opened = routes(&mut osm, CAR, 9, &[[(60.0, 20.0), (60.01, 20.0)]]).remove(0);
     assert_eq!(opened.route_cost, (metres((60.0, 20.0), (60.01, 20.0)) / 10.0 * 1000.0) as i64);
