@@ -22,7 +22,7 @@ pub(crate) struct Dds {
     /// What every kind has.
     pub(crate) common: Common,
     /// The rest as it is written.
-    pub(crate) table: DdsTable,
+    pub(crate) table: Box<DdsTable>,
     /// Which topics cross.
     pub(crate) topics: Rules,
     /// Quality of service by topic.
@@ -155,13 +155,13 @@ impl TryFrom<DdsTable> for Dds {
             self_generated: true,
         };
         let (types, exact) = built_in(table.version);
-        Ok(Self { common: common.check()?, table, topics, rules, types, exact })
+        Ok(Self { common: common.check()?, table: Box::new(table), topics, rules, types, exact })
     }
 }
 
 impl From<Dds> for DdsTable {
     fn from(bridge: Dds) -> Self {
-        bridge.table
+        *bridge.table
     }
 }
 
