@@ -34,6 +34,8 @@ enum Value {
     Capitals(&'static str),
     /// A key with a text.
     Text(&'static str),
+    /// A key with the name of a file, without which the service has nothing to work with.
+    File(&'static str),
     /// Read by OpenUxAS, but of no meaning here, and why.
     Nothing(&'static str),
     /// Read together with the children.
@@ -41,7 +43,7 @@ enum Value {
 }
 
 use Here::{Nothing, Service};
-use Value::{Capitals, Flag, Number, Text};
+use Value::{Capitals, File, Flag, Number, Text};
 
 /// Every service of OpenUxAS that configurations name. What is a `Service` of a kind that this program has not is told as
 /// having no equivalent, so that a new kind needs nothing here but its row.
@@ -155,7 +157,7 @@ const ROWS: &[Row] = &[
         names: &["OsmPlannerService"],
         here: Service("osm-planner"),
         attributes: &[
-            ("OsmFile", Text("osm_file")),
+            ("OsmFile", File("osm_file")),
             ("MapEdgesFile", Value::Nothing("the map is not drawn")),
             ("ShortestPathFile", Value::Nothing("ways are told in answers alone")),
             ("MetricsFile", Value::Nothing("`aldis bench plan` measures")),
@@ -180,6 +182,10 @@ pub(super) fn service(element: &Element, id: u32, import: &mut Import<'_>) -> bo
             false
         }
         Service(kind) if super::super::Service::KINDS.contains(&kind) => {
+            if let Some(missing) = missing_file(element, row, import) {
+                import.remark(element.line, nothing(&format!("there is no file `{}`", missing.display())));
+                return false;
+            }
             import.out.table("service", &title);
             import.out.key("kind", quoted(kind));
             import.out.key("service", id);
@@ -191,6 +197,14 @@ pub(super) fn service(element: &Element, id: u32, import: &mut Import<'_>) -> bo
             false
         }
     }
+}
+
+/// A file that a service cannot be without and that is not there.
+fn missing_file(element: &Element, row: &Row, import: &Import<'_>) -> Option<PathBuf> {
+    let files = row.attributes.iter().filter(|(_, value)| matches!(value, File(_)));
+    let mut named =
+        files.map(|(name, _)| place(import.directory, element.attribute(name).unwrap_or_default()));
+    named.find(|file| !file.is_file())
 }
 
 fn attributes(element: &Element, row: &Row, import: &mut Import<'_>) {
@@ -205,6 +219,9 @@ fn attributes(element: &Element, row: &Row, import: &mut Import<'_>) {
             Flag(key) => import.out.key(key, is_true(text)),
             Capitals(key) => import.out.key(key, quoted(&text.to_ascii_uppercase())),
             Text(key) => import.out.key(key, quoted(text)),
+            File(key) => {
+                import.out.key(key, quoted(&place(import.directory, text).display().to_string()));
+            }
             Value::Nothing(why) => {
                 import.remark(
                     element.line,
@@ -270,7 +287,7 @@ fn options(element: &Element, import: &mut Import<'_>) {
 /// Messages that are sent at times.
 fn messages(element: &Element, import: &mut Import<'_>) {
     let given = element.attribute("PathToMessageFiles").unwrap_or_default();
-    let directory = directory(import.directory, given);
+    let directory = place(import.directory, given);
     import.out.key("directory", quoted(&directory.display().to_string()));
     let mut rows = Vec::new();
     for child in &element.children {
@@ -308,12 +325,12 @@ fn messages(element: &Element, import: &mut Import<'_>) {
     import.out.key("messages", format!("[\n{}]", rows.concat()));
 }
 
-/// Where message files are. OpenUxAS is run in a directory below that of its configuration, and takes the path from there:
+/// Where a file or a directory is. OpenUxAS is run in a directory below that of its configuration, and takes the path from there:
 /// `../MessagesToSend/` lies beside the configuration.
-fn directory(configuration: &Path, given: &str) -> PathBuf {
+fn place(configuration: &Path, given: &str) -> PathBuf {
     let configuration = &std::path::absolute(configuration).unwrap_or_else(|_| configuration.to_owned());
     let plain = configuration.join(given);
-    if plain.is_dir() {
+    if plain.exists() {
         return plain;
     }
     let mut from_below = configuration.to_owned();
