@@ -190,7 +190,9 @@ impl Outbox {
             let cursor = flight.map_or(0, |flight| flight.cursor);
             let none = Ranges::default();
             let acknowledged = flight.map_or(&none, |flight| &flight.acknowledged);
-            let start = acknowledged.first_missing(cursor.into()) as u32;
+            // Word of an earlier copy may have come since the last piece went: what is missing then lies before it.
+            let start = [cursor.into(), 0].map(|from| acknowledged.first_missing(from) as u32);
+            let start = if start[0] < length { start[0] } else { start[1] };
             let limit = acknowledged.next_start(start.into()).map_or(length, |next| next as u32);
             let overhead = self.item(number, start, start + 1, now)?.overhead();
             let fits = room.checked_sub(overhead + 1).filter(|fits| *fits * 2 > full.min(64))?;

@@ -62,6 +62,19 @@ fn what_does_not_fit_beside_others_waits_for_its_own_frame_and_what_is_larger_is
 }
 
 #[test]
+fn word_of_an_earlier_copy_leaves_no_piece_out() {
+    let mut outbox = Outbox::new();
+    let number = outbox.add(entry(1, None, 600));
+    outbox.release(number);
+    while outbox.take(at(0), 250, 250, &hedge()).is_some() {}
+    // The second copy is under way when word comes that all but the first piece of the former arrived.
+    let (_, start, end) = outbox.take(at(60_000), 250, 250, &hedge()).unwrap();
+    assert_eq!(start, 0);
+    assert!(outbox.arrived(number, end, 600).is_none());
+    assert_eq!(outbox.take(at(60_000), 250, 250, &hedge()), Some((number, 0, end)));
+}
+
+#[test]
 fn what_expires_is_void_and_told() {
     let mut outbox = filled(&[Some(500), None]);
     assert!(outbox.expire(at(499)).is_none());
