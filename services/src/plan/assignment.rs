@@ -6,6 +6,7 @@
 
 mod arborescence;
 mod bound;
+mod depth_first;
 mod evaluate;
 mod exhaustive;
 mod file;
@@ -28,12 +29,11 @@ pub use file::{OptionRow, RequestFile, WayRow};
 pub use infeasible::{Cause, Infeasible};
 pub use request::{Objective, Precedence, Request, RequestError, TIME_MS_MAX, Task, TaskOption, Travel};
 
-use group_tree::GroupTree;
+use depth_first::Search;
 use neighbourhood::Neighbourhood;
 use problem::{NEVER, Problem};
 use relax::Relaxation;
 use schedule::{Routes, schedule};
-use tree::{Search, Tree};
 
 /// How much work a plan may cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -149,10 +149,9 @@ impl Assigner {
         let (makespan, total) = relaxation.bound(&problem.parts, &idle, &|_| false);
         let mut nodes = 0;
         let near = Neighbourhood::new(&problem, relaxation.clone(), effort.seed, &mut nodes);
-        let groups = GroupTree::new(&problem, relaxation.clone());
-        let tree: Option<Box<dyn Search>> = match groups {
-            Some(tree) => Some(Box::new(tree)),
-            None => Tree::new(&problem, relaxation).map(|tree| Box::new(tree) as Box<dyn Search>),
+        let tree: Option<Box<dyn Search>> = match group_tree::search(&problem, relaxation.clone()) {
+            Some(search) => Some(Box::new(search)),
+            None => tree::search(&problem, relaxation).map(|search| Box::new(search) as Box<dyn Search>),
         };
         let then = near.clone().map(Box::new);
         let work = match tables::nodes(&problem) {
