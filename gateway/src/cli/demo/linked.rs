@@ -189,18 +189,21 @@ pub(super) struct Texts {
     pub(super) boats: Vec<String>,
 }
 
-/// What crosses, the same at both ends: each rule names what only one of them has.
-fn rules(boat: u64) -> String {
+/// What crosses towards a boat. What other boats say is none of its business, and would cost its link's bytes.
+fn from_shore(boat: u64) -> String {
     format!(
         "[[link.rule]]\naddress = \"eid{boat}\"\nclass = \"command\"\nlifespan_s = 600\n\
-         [[link.rule]]\naddress = \"eid1\"\nclass = \"command\"\nlifespan_s = 60\n\
-         [[link.rule]]\ndescriptor = \"UMAA::SO::ResourceAllocation::ResourceAllocationReport\"\nclass = \"state\"\n\
-         [[link.rule]]\ndescriptor = \"UMAA::SO::ResourceAllocation\"\nclass = \"command\"\nlifespan_s = 30\n\
-         [[link.rule]]\ndescriptor = \"UMAA::SO::HealthReport\"\nclass = \"state\"\nrate_hz = 0.1\n\
-         [[link.rule]]\ndescriptor = \"afrl.cmasi.MissionCommand\"\nclass = \"command\"\nlifespan_s = 600\n\
-         [[link.rule]]\ndescriptor = \"afrl.vehicles.SurfaceVehicleState\"\nclass = \"state\"\n"
+         [[link.rule]]\ndescriptor = \"UMAA::SO::ResourceAllocation::ResourceAllocationCommand\"\nclass = \"command\"\nlifespan_s = 30\n\
+         [[link.rule]]\ndescriptor = \"afrl.cmasi.MissionCommand\"\nclass = \"command\"\nlifespan_s = 600\n"
     )
 }
+
+/// What crosses from a boat.
+const FROM_BOAT: &str = "[[link.rule]]\naddress = \"eid1\"\nclass = \"command\"\nlifespan_s = 60\n\
+    [[link.rule]]\ndescriptor = \"UMAA::SO::ResourceAllocation::ResourceAllocationReport\"\nclass = \"state\"\n\
+    [[link.rule]]\ndescriptor = \"UMAA::SO::ResourceAllocation\"\nclass = \"command\"\nlifespan_s = 30\n\
+    [[link.rule]]\ndescriptor = \"UMAA::SO::HealthReport\"\nclass = \"state\"\nrate_hz = 0.1\n\
+    [[link.rule]]\ndescriptor = \"afrl.vehicles.SurfaceVehicleState\"\nclass = \"state\"\n";
 
 fn carrier(profile: &Profile, listen: SocketAddr, peer: SocketAddr) -> String {
     let (rate, mtu) = (profile.rate, profile.mtu);
@@ -223,10 +226,10 @@ pub(super) fn links(profile: &Profile) -> Result<(Vec<Running>, Texts), Failure>
             texts.shore,
             "[[link]]\nname = \"boat-{boat}\"\npeer = {boat}\n{}{}",
             carrier(profile, shore, relay.address),
-            rules(boat)
+            from_shore(boat)
         );
         let own = carrier(profile, here, relay.address);
-        texts.boats.push(format!("[[link]]\nname = \"shore\"\npeer = 1\n{own}{}", rules(boat)));
+        texts.boats.push(format!("[[link]]\nname = \"shore\"\npeer = 1\n{own}{FROM_BOAT}"));
         relays.push(relay);
     }
     Ok((relays, texts))

@@ -1,9 +1,11 @@
 //! Confirmations across links: who waits until all readers have a sample waits for those beyond a link too.
 //!
 //! The end where somebody waits asks the other end, which answers once the readers on its side have the sample, and those beyond its
-//! own further links. Where they have not in time, the one who waits hears that the peer is missing.
+//! own further links. Where they have not in time, the one who waits hears that the peer is missing. A peer that refuses what its source
+//! says has no readers of it, and says so at once.
 
 use super::super::{Node, Origin};
+use super::EARLY_MAX;
 use crate::dds::{Participant, name_of};
 use crate::event::{Effect, LinkId};
 use crate::link::export::Newest;
@@ -162,7 +164,7 @@ impl Node {
         };
         if self.links.all[link].ready {
             self.links.give(link, link::Event::Offer(offer));
-        } else {
+        } else if self.links.all[link].early.len() < EARLY_MAX {
             self.links.all[link].early.push(offer);
         }
     }
@@ -187,6 +189,8 @@ impl Node {
         let came = &mut self.links.confirming.came;
         let far = Came { there, here: sample.stamp.sequence, on };
         match came.get_mut(&of) {
+            // The last states of two instances may overtake each other.
+            Some(came) if came.there > there => {}
             Some(came) => *came = far,
             None => {
                 // Of a node's former life nothing is asked any more.
@@ -224,6 +228,9 @@ impl Node {
             return;
         }
         let Some(ask) = aldis::decode::<told::ConfirmAsk>(content) else { return };
+        if !self.links.all[link].spec.export.behind.contains(&ask.stream.source.entity) {
+            return self.tell_peer(now, link, told::CONFIRMED, aldis::encode(&ask.number), WORD_LASTS);
+        }
         let lasts =
             envelope.stamp.lifespan_left_ms.map_or(WORD_LASTS, |left| Duration::from_millis(left.into()));
         let confirming = &mut self.links.confirming;

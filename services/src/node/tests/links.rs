@@ -259,3 +259,24 @@ fn who_waits_for_all_readers_waits_for_those_beyond_a_link() {
     world.run_for(Duration::from_secs(6));
     assert_eq!((confirmed()[2..].to_vec(), has("9")), (vec!["9 Ok(())".to_owned()], true));
 }
+
+#[test]
+fn a_peer_that_refuses_what_a_source_says_is_no_reader_of_it() {
+    let (waiting, told) = super::sharing::writer(source(400, 100), "UMAA::SO::T::TReport", &["go"]);
+    let mut world = world();
+    let links = vec![spec(1, 400, &[400], rules()), spec(1, 401, &[401], rules())];
+    let shore = world.add(linked(&[1], Vec::new(), links)).unwrap();
+    let mut first = linked(&[400], vec![waiting], vec![spec(400, 1, &[1, 401], rules())]);
+    first.bridges.push(bridge(400));
+    let first = world.add(first).unwrap();
+    // What 400 says is not shore's to say here.
+    let second = world.add(linked(&[401], Vec::new(), vec![spec(401, 1, &[1], rules())])).unwrap();
+    world.partition(&[0, 1, 2], Duration::ZERO);
+    world.join((shore, LinkId(0)), (first, LinkId(0)), CARRIER, &Profile::L1);
+    world.join((shore, LinkId(1)), (second, LinkId(0)), CARRIER, &Profile::L1);
+    world.run_for(Duration::from_secs(30));
+    say(&mut world, first, "?7");
+    world.run_for(Duration::from_secs(6));
+    assert_eq!(of(&told, "confirmed "), ["7 Ok(())"]);
+    assert!(world.node(second).counters().refused_links > 0, "shore offered it to the second vehicle");
+}
